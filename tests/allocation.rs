@@ -123,6 +123,7 @@ fn joints_with_two_degrees_of_freedom_closing_joints_and_every_kind_of_play_allo
                 let changes = [("formulation", form), ("solver.method", method)];
                 let mut simulation = Simulation::new(&common::parse(text, &changes).machine).unwrap();
                 let mut frame = Frame::default();
+                simulation.track_wear();
                 simulation.step().unwrap();
                 simulation.sample(simulation.time(), &mut frame);
                 let count = allocations(|| {

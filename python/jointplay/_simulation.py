@@ -55,6 +55,16 @@ class Frame:
     """Displacement of each pin or block along the joint's axis, m; 0 for a ball: shape (joints,)."""
     tilts: NDArray[np.float64]
     """Angle between each pin and its bearing, or block and guide, rad; 0 for a ball: shape (joints,)."""
+    sites: list[str]
+    """Names of all places where a joint with play can touch, by joint, as in `Scene.sites`; the next arrays have a row for each."""
+    gaps: NDArray[np.float64]
+    """Distance to the wall, m; negative in contact, infinite in a joint or direction without play: shape (sites,)."""
+    site_normal_forces: NDArray[np.float64]
+    """Normal force on the ball, pin or block there, N; 0 in an ideal joint: shape (sites, 3)."""
+    site_friction_forces: NDArray[np.float64]
+    """Friction force on it there, N: shape (sites, 3)."""
+    contact_points: NDArray[np.float64]
+    """Where they act, m: shape (sites, 3)."""
     values: NDArray[np.float64] = field(repr=False)
     """All channels, in the order of `Simulation.channels`."""
 

@@ -125,12 +125,18 @@ pub fn answer<T>(py: Python<'_>, answer: Result<T, RestartError>) -> PyResult<T>
 }
 
 /// A matrix with these entries as an array.
-pub fn matrix(py: Python<'_>, shape: (usize, usize), entry: impl Fn((usize, usize)) -> f64) -> Bound<'_, PyArray2<f64>> {
+pub fn matrix(
+    py: Python<'_>,
+    shape: (usize, usize),
+    entry: impl Fn((usize, usize)) -> f64,
+) -> Bound<'_, PyArray2<f64>> {
     PyArray2::from_owned_array(py, Array2::from_shape_fn(shape, entry))
 }
 
 /// An array that cannot be written: it is a copy, and writing to it would not change the simulation.
-pub fn read_only<T: Element, D: numpy::ndarray::Dimension>(array: Bound<'_, PyArray<T, D>>) -> Bound<'_, PyArray<T, D>> {
+pub fn read_only<T: Element, D: numpy::ndarray::Dimension>(
+    array: Bound<'_, PyArray<T, D>>,
+) -> Bound<'_, PyArray<T, D>> {
     array.readwrite().make_nonwriteable();
     array
 }

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use jointplay_physics::machine::{Mat3, Vec3};
-use jointplay_physics::simulate::{ChannelInfo, Coordinate, Effect, Frame, Stopped, matching};
+use jointplay_physics::simulate::{
+    ChannelInfo, ContactMode, Coordinate, Effect, Frame, JointReport, SiteReport, Stopped, matching,
+};
 use jointplay_scene::{LiveScene, SavedState, Scene, SceneError, SceneSnapshot};
 use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{PyArray1, PyArray2, PyArray3};
@@ -395,6 +397,13 @@ impl PySimulation {
         all.set_item("axial", control::read_only(axial))?;
         let tilts = PyArray1::from_iter(py, frame.joints.iter().map(|joint| joint.tilt));
         all.set_item("tilts", control::read_only(tilts))?;
+        let joints = || self.live.running().machine.loose_joints.iter();
+        all.set_item("sites", joints().flat_map(|joint| joint.sites()).collect::<Vec<String>>())?;
+        let sites: Vec<SiteReport> = sites(frame).collect();
+        all.set_item("gaps", control::read_only(PyArray1::from_iter(py, sites.iter().map(|site| site.gap))))?;
+        all.set_item("site_normal_forces", vectors(py, sites.iter().map(|site| site.normal_force)))?;
+        all.set_item("site_friction_forces", vectors(py, sites.iter().map(|site| site.friction_force)))?;
+        all.set_item("contact_points", vectors(py, sites.iter().map(|site| site.contact_point)))?;
         Ok(all)
     }
 
@@ -429,6 +438,24 @@ impl PySimulation {
     fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         report::statistics(py, &self.live)
     }
+}
+
+/// The places where the joints with play can touch: those that the frame lists, and for each joint with one place that.
+fn sites(frame: &Frame) -> impl Iterator<Item = SiteReport> + '_ {
+    let only = |joint: usize, report: &JointReport| {
+        let &JointReport { penetration, normal_force, friction_force, contact_point, .. } = report;
+        match report.state {
+            ContactMode::Ideal => {
+                let [normal_force, friction_force] = [Vec3::zeros(); 2];
+                SiteReport { joint, gap: f64::INFINITY, normal_force, friction_force, contact_point }
+            }
+            _ => SiteReport { joint, gap: -penetration, normal_force, friction_force, contact_point },
+        }
+    };
+    frame.joints.iter().enumerate().flat_map(move |(joint, report)| {
+        let several = frame.sites_of(joint);
+        several.is_empty().then(|| only(joint, report)).into_iter().chain(several.iter().copied())
+    })
 }
 
 /// An array with one row per vector.

@@ -74,6 +74,36 @@ def test_channels_of_an_end_and_frames_agree():
     assert np.allclose(frame.eccentricities[0], [0, 0, -PLAY + simulation["J.a.gap"]], atol=1e-15)
 
 
+def test_a_frame_has_the_forces_of_each_site():
+    scene = jp.Scene.load("slider-crank-worn")
+    simulation = jp.Simulation(scene)
+    touched = set()
+    for _ in range(400):
+        simulation.step(5)
+        frame = simulation.frame()
+        assert frame.sites == [site for sites in scene.sites.values() for site in sites]
+        assert frame.gaps.shape == (len(frame.sites),)
+        shape = (len(frame.sites), 3)
+        assert frame.site_normal_forces.shape == frame.site_friction_forces.shape == frame.contact_points.shape == shape
+        row = 0
+        for joint, sites in enumerate(scene.sites.values()):
+            # A joint has the forces of its sites.
+            rows = slice(row, row + len(sites))
+            row += len(sites)
+            for forces, whole in [(frame.site_normal_forces, frame.normal_forces), (frame.site_friction_forces, frame.friction_forces)]:
+                assert np.allclose(forces[rows].sum(axis=0), whole[joint], rtol=1e-12, atol=1e-12)
+        for i, site in enumerate(frame.sites):
+            assert frame.gaps[i] == simulation[f"{site}.gap"]
+            force = np.linalg.norm(frame.site_normal_forces[i])
+            assert np.isclose(force, simulation[f"{site}.normal"]) and (force == 0 or frame.gaps[i] < 0)
+            touched |= {site} if force > 0 else set()
+    assert {"crank-pin", "guide.1y"} <= touched, touched
+    # A ball is one site; of an ideal one the reaction is no force of a contact.
+    ideal = jp.Simulation(jp.Scene.load("slider-crank")).frame()
+    assert ideal.sites == ["B", "C"] and np.isinf(ideal.gaps[0]) and np.isfinite(ideal.gaps[1])
+    assert not ideal.site_normal_forces[0].any() and ideal.normal_forces[0].any()
+
+
 def test_plays_are_parameters_that_a_run_changes():
     scene = jp.Scene.from_toml(PIN)
     keys = scene.parameters

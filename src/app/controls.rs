@@ -83,7 +83,7 @@ impl Controls {
         self.joint = 0;
     }
 
-    /// Brings the slider of `key`, which belongs to a ball joint, into view and focuses it.
+    /// Brings the slider of `key`, which belongs to a joint with play, into view and focuses it.
     pub fn reveal(&mut self, key: &str) {
         self.drafts.remove(key);
         self.revealed = Some(key.to_owned());
@@ -193,7 +193,7 @@ impl Controls {
             .on_hover_text("How far the numbers can be trusted. Method, step and tolerance are set under Solver.");
     }
 
-    /// Contact parameters of a ball joint, which override those of the scene.
+    /// Contact parameters of a joint with play, which override those of the scene.
     fn one_joint(&mut self, ui: &mut Ui, player: &mut Player) {
         let names: Vec<String> = player.pending().machine.loose_joints.iter().map(|j| j.name.clone()).collect();
         if names.is_empty() {

@@ -377,7 +377,7 @@ impl App {
         let begin = if is_fresh { lesson.run_start_step(last) } else { last };
         for step in &lesson.steps[begin..=last] {
             if !step.begins && step.link != Link::default() {
-                // The camera continues to follow its ball joint.
+                // The camera continues to follow its joint.
                 let followed = self.run.viewport.followed().filter(|_| step.link.camera.is_none());
                 self.run.set_look(&step.link);
                 self.show_link(step.link.clone());

@@ -9,6 +9,7 @@ use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, Wid
 use glam::Vec3;
 
 use super::keys::Action;
+use super::paths::Point;
 use super::player::Player;
 use super::run::Run;
 use super::{layout, sound, spoken, theme, value};
@@ -178,19 +179,19 @@ impl Microscope {
             return;
         }
         let sheet = Sheet::new(ui, rect, magnified);
+        let now = player.pacer.shown();
+        let path = |number: usize| player.paths().between(self.joint, number, magnified.since, now);
         let help = match magnified.kind {
-            LooseKind::Pin(kind) if kind.length.is_some() => pin::draw(&sheet, &kind, axes),
-            LooseKind::Slide(kind) => slide::draw(&sheet, &kind),
-            LooseKind::Ball | LooseKind::Pin(_) => self.circle_of(&sheet, player, axes),
+            LooseKind::Pin(kind) if kind.length.is_some() => pin::draw(&sheet, &kind, axes, [0, 1].map(path), now),
+            LooseKind::Slide(kind) => slide::draw(&sheet, &kind, path(0), now),
+            LooseKind::Ball | LooseKind::Pin(_) => self.circle_of(&sheet, path(0), now, axes),
         };
         response.on_hover_text(help);
     }
 
     /// The clearance circle of a joint that touches at one place.
-    fn circle_of(&mut self, sheet: &Sheet<'_>, player: &Player, axes: [Vec3; 2]) -> &'static str {
+    fn circle_of(&mut self, sheet: &Sheet<'_>, path: &[Point], now: f64, axes: [Vec3; 2]) -> &'static str {
         let magnified = sheet.magnified();
-        let now = player.pacer.shown();
-        let path = player.paths().between(self.joint, magnified.since, now);
         let approach = magnified.impact.map_or(0.0, |impact| impact.approach_speed);
         let fastest = magnified.sliding.unwrap_or(magnified.velocity).norm();
         let speed = draw::round_up(approach.max(fastest).max(MIN_REFERENCE_SPEED));

@@ -894,7 +894,7 @@ impl Viewport {
     pub fn options_ui(&mut self, ui: &mut Ui) {
         let options = &mut self.options;
         ui.label("Magnification of the clearance").on_hover_text(
-            "Draws eccentricity and clearance enlarged by the same factor, so the ball stays in its socket. The \
+            "Draws eccentricity and clearance enlarged by the same factor, so the parts stay within their play. The \
              motion of the machine is not magnified. Key X.",
         );
         let slider = Slider::new(&mut options.magnification, 1.0..=100.0).logarithmic(true).prefix("×").max_decimals(1);
@@ -903,10 +903,12 @@ impl Viewport {
         ui.add_space(4.0);
         ui.label("Force arrows");
         ui.horizontal(|ui| {
-            ui.checkbox(&mut options.arrows.normal, "Normal").on_hover_text("Normal force on each ball, N");
-            ui.checkbox(&mut options.arrows.friction, "Friction").on_hover_text("Friction force on each ball, N");
+            ui.checkbox(&mut options.arrows.normal, "Normal")
+                .on_hover_text("Normal force on each ball, pin or block, N");
+            ui.checkbox(&mut options.arrows.friction, "Friction")
+                .on_hover_text("Friction force on each ball, pin or block, N");
             ui.add_enabled(options.arrows.normal, Checkbox::new(&mut options.arrows.peaks, "Peaks")).on_hover_text(
-                "A hollow arrow where a ball has struck: its largest normal force, N, and how long ago that was in \
+                "A hollow arrow where a part has struck: its largest normal force, N, and how long ago that was in \
                      simulated time. It fades as simulated time passes.",
             );
         });
@@ -934,7 +936,7 @@ impl Viewport {
         ui.add_space(4.0);
         ui.label("Show");
         ui.checkbox(&mut options.flash, "Flash joints on impact")
-            .on_hover_text("A ring of light about a joint when its ball has struck, brighter for a harder blow");
+            .on_hover_text("A ring of light about a joint when its parts have struck, brighter for a harder blow");
         ui.checkbox(&mut options.joint_names, "Joint names").on_hover_text("Names beside the joints with play");
         ui.horizontal(|ui| {
             ui.checkbox(&mut options.sockets, "Sockets").on_hover_text("The sockets, cut open");
@@ -947,12 +949,12 @@ impl Viewport {
         ui.checkbox(&mut options.trail, "Trail of the tip").on_hover_text("Where the probe tip has been");
         ui.add_space(4.0);
         ui.label("Wear map").on_hover_text(
-            "Colours the inner faces of the sockets by impulse or friction work since the reset, in cells of equal \
-             area; the balls become translucent. The scale is logarithmic and follows the largest value.",
+            "Colours the walls of joints with play by impulse or friction work per area since the reset; balls, pins and \
+             blocks become translucent. The scale is logarithmic and follows the largest value.",
         );
         ui.horizontal(|ui| {
             for (map, name, help) in [
-                (WearMap::Off, "Off", "Sockets as they are"),
+                (WearMap::Off, "Off", "Walls as they are"),
                 (WearMap::Impulse, "Impulse", "How often and how hard: time integral of the normal force, N s/mm²"),
                 (WearMap::FrictionWork, "Friction work", "Magnitude of the friction work, mJ/mm²"),
             ] {

@@ -10,7 +10,7 @@ use super::{App, BUILT_IN_LESSONS, layout, opening, spoken, theme, value};
 
 /// Simulated seconds per second: a ball takes about half a second from wall to wall.
 const SCALE: f64 = 0.01;
-/// The ball joint shown.
+/// The joint with play shown.
 const JOINT: usize = 0;
 /// Width of the panel beside the picture relative to the window's, and its range, points.
 const PANEL_SHARE: f32 = 0.3;

@@ -143,8 +143,8 @@ pub struct RunArguments {
     /// File for one row per finished impact, with its effective restitution: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<PathBuf>,
-    /// File for the wear map: one row per cell of the sockets' inner faces, with the contacts that began there, the
-    /// impulse and the friction work: .csv, .json or .npz.
+    /// File for the wear map: one row per cell of the walls of joints with play, with the contacts that began there,
+    /// the impulse and the friction work: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub wear: Option<PathBuf>,
     /// File for the state at the end, from which --from-state resumes, with the same bits as a run without a break.
@@ -303,7 +303,8 @@ pub struct RenderArguments {
     /// Parts of the picture to hide, e.g. `floor,triad`.
     #[arg(long, value_enum, value_name = "PART,…", value_delimiter = ',', help_heading = "Picture")]
     pub hide: Vec<Hideable>,
-    /// Colour the sockets' inner faces by their wear since the start, with a scale; balls become translucent.
+    /// Colour the walls of joints with play by their wear since the start, with a scale; balls, pins and blocks become
+    /// translucent.
     #[arg(long, value_enum, value_name = "WHAT", help_heading = "Picture")]
     pub wear: Option<WearChoice>,
     /// Write time, forces and labels over the picture.

@@ -1,4 +1,4 @@
-//! Peak loads of force elements and of joints other than ball joints, in words and as JSON.
+//! Peak loads of force elements and of joints without play, in words and as JSON.
 
 use serde_json::{Map, Value as Json, json};
 

@@ -41,7 +41,6 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     let times = row_times(arguments, duration)?;
     let scene = load(&arguments.scene)?;
-    let unmapped = if arguments.wear.is_some() { wear::without_map("--wear", &scene)? } else { None };
     let mut simulation = start(&scene)?;
     // From here on there may be temporary files, which an interrupted run removes.
     interrupt::listen();
@@ -81,7 +80,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if starts_wear && arguments.from_state.is_some() {
             warn("the wear map begins at the saved state, which has none");
         }
-        start_report.warnings_of(&scene).iter().chain(&unmapped).for_each(|warning| warn(warning));
+        start_report.warnings_of(&scene).iter().for_each(|warning| warn(warning));
     }
 
     let progress = progress::bar(!arguments.quiet, position(duration));

@@ -1,15 +1,14 @@
-//! `run --wear`: one row per cell of each socket's inner face, with its contacts, impulse and friction work.
+//! `run --wear`: one row per cell of the walls of each joint with play, with its contacts, impulse and friction work.
 
 use serde_json::{Map, Value as Json, json};
 
 use super::Failure;
 use super::output::{RowsFile, Table};
 use crate::files::PendingFile;
-use crate::machine::LooseKind;
 use crate::scene::Scene;
-use crate::simulate::{Edges, Wear};
+use crate::simulate::Wear;
 
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 13] = [
     "joint",
     "cell",
     "polar_from_rad",
@@ -22,22 +21,8 @@ const COLUMNS: [&str; 12] = [
     "friction_work_J",
     "impulse_N_s_m2",
     "friction_work_J_m2",
+    "site",
 ];
-
-/// The joints with play that have no wear map, in words; `None` if all have one.
-///
-/// # Errors
-/// Usage, if none has one.
-pub fn without_map(option: &str, scene: &Scene) -> Result<Option<String>, Failure> {
-    let loose = || scene.machine.loose_joints.iter().filter(|joint| !joint.contact.is_ideal());
-    let others = loose().filter(|joint| joint.kind != LooseKind::Ball);
-    let names: Vec<String> = others.map(|joint| format!("{} ({})", joint.name, joint.kind.word())).collect();
-    if names.is_empty() {
-        return Ok(None);
-    }
-    let words = format!("{option}: only ball joints have a wear map, not {}", names.join(", "));
-    if names.len() == loose().count() { Err(Failure::usage(words)) } else { Ok(Some(words)) }
-}
 
 /// Writes `map` to `file` with its provenance `meta`, under temporary names. Also returns the number of rows.
 ///
@@ -52,25 +37,28 @@ pub fn fill(
     let mut rows = Vec::new();
     let mut axes = Map::new();
     for (j, joint) in scene.machine.loose_joints.iter().enumerate() {
-        let area = map.area(j);
-        for (cell, totals) in map.cells(j).iter().enumerate() {
-            let Edges { polar, azimuth } = map.grid().edges(cell);
+        let cells = map.division(j).each().zip(map.cells(j)).enumerate();
+        for (number, ((part, cell), totals)) in cells {
+            let edges = part.edges(cell);
+            // A wall is not divided by all angles.
+            let [polar, azimuth] = [edges.polar, edges.azimuth].map(|edges| edges.unwrap_or([f64::NAN; 2]));
             rows.push([
                 j as f64,
-                cell as f64,
+                number as f64,
                 polar[0],
                 polar[1],
                 azimuth[0],
                 azimuth[1],
-                area,
+                part.area,
                 totals.contacts as f64,
                 totals.impulse,
                 totals.friction_work,
-                totals.impulse / area,
-                totals.friction_work / area,
+                totals.impulse / part.area,
+                totals.friction_work / part.area,
+                f64::from(part.place),
             ]);
         }
-        let grid = map.grid_from_body(j);
+        let grid = map.division(j).axes();
         let axis = |i: usize| [0, 1, 2].map(|k| grid[(i, k)]);
         let body = joint.carrier().body.map(|b| scene.machine.bodies[b].name.as_str());
         axes.insert(joint.name.clone(), json!({"body": body, "x": axis(0), "y": axis(1), "z": axis(2)}));
@@ -79,7 +67,9 @@ pub fn fill(
     meta.insert("rows".into(), json!(rows.len()));
     // Indices in the column `joint`, from 0.
     meta.insert("ball_joints".into(), json!(names));
-    // Axes of the polar angles and azimuths: those of the socket's body; `null` is the world.
+    // By joint, the names of the indices in the column `site`.
+    meta.insert("sites".into(), scene.machine.loose_joints.iter().map(|joint| json!(joint.sites())).collect());
+    // Axes of the polar angles and azimuths, in those of the carrier's body; `null` is the world.
     meta.insert("socket_axes".into(), Json::Object(axes));
     let count = rows.len();
     let table = Table::of_rows(COLUMNS, rows.into_iter());

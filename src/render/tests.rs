@@ -709,12 +709,12 @@ fn cells_with_contact_have_the_colour_of_their_value_and_others_none() {
         let socket = to_f32(&frame.joints[0].socket_centre);
         let inner = 0.01 + 0.3e-3 * list.magnification;
         let (mut struck, mut clear, mut brightest) = (0, 0, 0.0_f32);
-        for (i, cell) in wear.cells(0).iter().enumerate() {
-            let edges = wear.grid().edges(i);
-            let middle = |[from, to]: [f64; 2]| 0.5 * (from + to);
+        for (i, ((part, number), cell)) in wear.division(0).each().zip(wear.cells(0)).enumerate() {
+            let edges = part.edges(number);
+            let middle = |edges: Option<[f64; 2]>| 0.5 * edges.expect("of a sphere").iter().sum::<f64>();
             let ((s, c), (sa, ca)) = (middle(edges.polar).sin_cos(), middle(edges.azimuth).sin_cos());
             // Its socket is fixed to the world.
-            let direction = wear.grid_from_body(0).transpose() * Vec3d::new(s * ca, s * sa, c);
+            let direction = wear.division(0).axes().transpose() * Vec3d::new(s * ca, s * sa, c);
             let point = socket + to_f32(&direction) * (0.99 * inner);
             let to_eye = (camera.eye() - point).normalize();
             if to_f32(&direction).dot(to_eye) > -0.3 {
@@ -724,7 +724,7 @@ fn cells_with_contact_have_the_colour_of_their_value_and_others_none() {
             let per_area = match map {
                 WearMap::FrictionWork => cell.friction_work.abs() * 1e3,
                 _ => cell.impulse,
-            } / (wear.area(0) * 1e6);
+            } / (part.area * 1e6);
             if cell.impulse == 0.0 {
                 assert!(difference(before, after) <= 1, "cell {i} had no contact");
                 clear += 1;

@@ -9,7 +9,7 @@ use crate::units::format_quantity_digits;
 /// A warning about a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Advice {
-    /// Key of the parameter, without its section where ball joints may override it; `None` if it concerns no parameter.
+    /// Key of the parameter, without its section where joints with play may override it; `None` if it concerns no parameter.
     key: Option<&'static str>,
     /// The sentence of files and the command line.
     pub text: String,

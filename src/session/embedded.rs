@@ -5,7 +5,7 @@
 pub enum Part {
     /// The first sliders.
     Controls,
-    /// Lanes of the ball joints.
+    /// Lanes of the joints with play.
     Timeline,
     /// The visible plots.
     Plots,

@@ -1,4 +1,4 @@
-//! The ideal motion beside the run: the same scene with every ball joint closed, under the same drives and applied forces. It is
+//! The ideal motion beside the run: the same scene with every joint with play closed, under the same drives and applied forces. It is
 //! computed only while shown, up to the displayed instant, and does not affect the run.
 
 use super::clock::Clock;

@@ -495,7 +495,7 @@ impl Link {
             .transpose()
     }
 
-    /// Index of the ball joint under the microscope in `scene`, if any.
+    /// Index of the joint with play under the microscope in `scene`, if any.
     ///
     /// # Errors
     /// There is no such joint.
@@ -508,7 +508,7 @@ impl Link {
             Some(joint) => Ok(Some(joint)),
             None => {
                 let known: Vec<_> = scene.machine.loose_joints.iter().map(|j| j.name.as_str()).collect();
-                let message = format!("no such ball joint; allowed: {}", known.join(", "));
+                let message = format!("no such joint with play; allowed: {}", known.join(", "));
                 Err(link_error("show", &format!("microscope.{name}"), message))
             }
         }

@@ -62,7 +62,7 @@ impl Event {
     pub fn apply(&self, run: &mut LiveScene) -> Result<Effect, SetError> {
         match self {
             Self::Set { key, value } => run.set(key, value),
-            // A ball joint without a value of its own in the file follows the common one again, whatever that is now.
+            // A joint without a value of its own in the file follows the common one again, whatever that is now.
             Self::Original { key } => run.undo_change(key),
             Self::Pull(pulled) => Ok(run.pull(pulled.map(Pull::from)).map(|()| Effect::Now)?),
             Self::Sections { .. } | Self::Stop => Ok(Effect::Now),

@@ -1,34 +1,58 @@
-//! The recent path of each ball in its socket, drawn by the microscope.
+//! The recent paths of the parts of joints with play, drawn by the microscope: of a ball's centre, of both ends of a pin's axis, or of
+//! its middle if it does not tilt, of a block's centre.
 
-use crate::machine::Mat3;
+use crate::machine::{EndsOn, LooseJoint, LooseKind, Mat3, Pin, Vec3};
 use crate::scene::Scene;
-use crate::simulate::{Frame, RECORDED_JOINTS};
+use crate::simulate::{Frame, JointReport, RECORDED_JOINTS};
 
-/// Points stored per ball joint.
+/// Points stored per path.
 const MAX_POINTS: usize = 4096;
-/// A ball that has moved by less than this fraction of its clearance counts as unmoved.
+/// A point that has moved by less than this fraction of the clearance counts as unmoved.
 const RESOLUTION: f32 = 1e-3;
 
-/// Position of a ball's centre.
+/// Position of a point of the carried part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Time, s.
     pub time: f64,
-    /// Position from the socket's centre, in the axes of the socket's body, m: the path turns with its socket.
+    /// Position from where the point is without play, of a block from the middle of its guide, in the axes of the carrier's body, m:
+    /// the path turns with the socket.
     pub position: [f32; 3],
 }
 
-/// The latest path of each of the first [`RECORDED_JOINTS`] ball joints.
+/// The latest paths of the first [`RECORDED_JOINTS`] joints with play.
 #[derive(Clone, Default)]
 pub struct Paths {
-    joints: Vec<Path>,
+    joints: Vec<JointPaths>,
 }
 
 #[derive(Clone)]
-struct Path {
-    /// The body that carries the socket; `None` is the world.
-    carrier: Option<usize>,
-    points: Vec<Point>,
+struct JointPaths {
+    joint: LooseJoint,
+    /// One, or those of both ends of a pin.
+    paths: Vec<Vec<Point>>,
+}
+
+/// Where the pin's axis is at the places `a` and `b`, from the bearing's axis, m, world axes; `axes` are those of the frames of bearing and
+/// pin as columns.
+pub fn ends_of_pin(kind: &Pin, report: &JointReport, axes: &[Mat3; 2]) -> [Vec3; 2] {
+    let [bearing, pin] = axes;
+    let (a, b) = (bearing.column(0), pin.column(0));
+    let slope = b / a.dot(&b) - a;
+    let half = 0.5 * kind.length.unwrap_or_default();
+    // The ends are those of the bearing, past which the pin has slid, or those of the pin.
+    let slid = if kind.ends == EndsOn::Bearing { report.axial } else { 0.0 };
+    [-half, half].map(|x| report.eccentricity + slope * (x - slid))
+}
+
+/// What a path follows, m, world axes, by its number.
+fn tracked(joint: &LooseJoint, report: &JointReport, frame: &Frame) -> [Vec3; 2] {
+    let axes = || joint.frames.map(|own| frame.axes_of(&own));
+    match &joint.kind {
+        LooseKind::Pin(pin) if pin.length.is_some() => ends_of_pin(pin, report, &axes()),
+        LooseKind::Ball | LooseKind::Pin(_) => [report.eccentricity; 2],
+        LooseKind::Slide(_) => [report.eccentricity + axes()[0].column(0) * report.axial; 2],
+    }
 }
 
 /// Axes of body `body` as columns; those of the world for `None`.
@@ -40,45 +64,54 @@ impl Paths {
     /// Empty paths for `scene`.
     pub fn new(scene: &Scene) -> Self {
         let joints = scene.machine.loose_joints.iter().take(RECORDED_JOINTS);
-        let path = |joint: &crate::machine::LooseJoint| Path { carrier: joint.carrier().body, points: Vec::new() };
-        Self { joints: joints.map(path).collect() }
+        let empty = |joint: &LooseJoint| {
+            let count = if matches!(joint.kind, LooseKind::Pin(Pin { length: Some(_), .. })) { 2 } else { 1 };
+            JointPaths { joint: joint.clone(), paths: vec![Vec::new(); count] }
+        };
+        Self { joints: joints.map(empty).collect() }
     }
 
     /// Records an instant of the run. An instant before the latest starts a new branch: later points are dropped.
     pub fn record(&mut self, frame: &Frame) {
-        for (path, joint) in self.joints.iter_mut().zip(&frame.joints) {
-            let points = &mut path.points;
-            while points.last().is_some_and(|last| last.time > frame.time) {
-                points.pop();
+        for (own, report) in self.joints.iter_mut().zip(&frame.joints) {
+            for points in &mut own.paths {
+                while points.last().is_some_and(|last| last.time > frame.time) {
+                    points.pop();
+                }
             }
-            let local = axes_of(frame, path.carrier).tr_mul(&joint.eccentricity);
-            let position = [local.x as f32, local.y as f32, local.z as f32];
-            let resolution = RESOLUTION * joint.clearance as f32;
-            let has_moved = |last: &Point| {
-                let squares = last.position.iter().zip(&position).map(|(a, b)| (a - b) * (a - b));
-                squares.sum::<f32>() > resolution * resolution
-            };
-            // In an ideal joint the ball cannot move.
-            if joint.clearance <= 0.0 || !points.last().is_none_or(has_moved) {
+            // In an ideal joint the part cannot move.
+            if report.clearance.max(report.second_clearance) <= 0.0 {
                 continue;
             }
-            if points.len() == MAX_POINTS {
-                // Half at once: shifting all points for each new one would be too costly.
-                points.drain(..MAX_POINTS / 2);
+            let carrier = axes_of(frame, own.joint.carrier().body);
+            let resolution = RESOLUTION * report.clearance.max(report.second_clearance) as f32;
+            for (points, at) in own.paths.iter_mut().zip(tracked(&own.joint, report, frame)) {
+                let local = carrier.tr_mul(&at);
+                let position = [local.x as f32, local.y as f32, local.z as f32];
+                let has_moved = |last: &Point| {
+                    let squares = last.position.iter().zip(&position).map(|(a, b)| (a - b) * (a - b));
+                    squares.sum::<f32>() > resolution * resolution
+                };
+                if !points.last().is_none_or(has_moved) {
+                    continue;
+                }
+                if points.len() == MAX_POINTS {
+                    // Half at once: shifting all points for each new one would be too costly.
+                    points.drain(..MAX_POINTS / 2);
+                }
+                points.push(Point { time: frame.time, position });
             }
-            let time = frame.time;
-            points.push(Point { time, position });
         }
     }
 
-    /// The path of ball joint `joint` from `from` to `to`, s, the oldest point first; empty where none is recorded.
-    pub fn between(&self, joint: usize, from: f64, to: f64) -> &[Point] {
-        let Some(path) = self.joints.get(joint) else {
+    /// Path `number` of joint `joint` from `from` to `to`, s, the oldest point first; empty where none is recorded.
+    pub fn between(&self, joint: usize, number: usize, from: f64, to: f64) -> &[Point] {
+        let Some(points) = self.joints.get(joint).and_then(|own| own.paths.get(number)) else {
             return &[];
         };
-        let start = path.points.partition_point(|point| point.time < from);
-        let end = path.points.partition_point(|point| point.time <= to);
-        &path.points[start..end.max(start)]
+        let start = points.partition_point(|point| point.time < from);
+        let end = points.partition_point(|point| point.time <= to);
+        &points[start..end.max(start)]
     }
 }
 
@@ -105,11 +138,11 @@ mod tests {
         let mut other = Simulation::new(&scene.machine).expect("starts");
         let mut frame = Frame::default();
         for (joint, spec) in scene.machine.loose_joints.iter().enumerate() {
-            let points = player.paths().between(joint, ALL.0, ALL.1);
+            let points = player.paths().between(joint, 0, ALL.0, ALL.1);
             assert!(points.len() > 100, "{}: {}", spec.name, points.len());
             assert!(points.is_sorted_by(|a, b| a.time < b.time));
         }
-        let points = player.paths().between(0, ALL.0, ALL.1);
+        let points = player.paths().between(0, 0, ALL.0, ALL.1);
         let (mut at, mut rotation_change) = (0, 0.0_f64);
         while at < points.len() {
             let point = points[at];
@@ -136,20 +169,20 @@ mod tests {
         player.single_step();
         player.step_back();
         let shown = player.pacer.shown();
-        let before = player.paths().between(0, ALL.0, shown).to_vec();
+        let before = player.paths().between(0, 0, ALL.0, shown).to_vec();
         for _ in 0..30 {
             player.single_step();
         }
         let shown = player.pacer.shown();
-        assert!(player.paths().between(0, ALL.0, ALL.1).len() > before.len());
+        assert!(player.paths().between(0, 0, ALL.0, ALL.1).len() > before.len());
         for _ in 0..30 {
             player.step_back();
         }
         let now = player.pacer.shown();
-        assert_eq!(player.paths().between(0, ALL.0, now), before);
+        assert_eq!(player.paths().between(0, 0, ALL.0, now), before);
         player.set("contact.friction", "0.5").expect("in range");
         player.run_to(shown);
-        let points = player.paths().between(0, ALL.0, ALL.1);
+        let points = player.paths().between(0, 0, ALL.0, ALL.1);
         assert!(points.is_sorted_by(|a, b| a.time < b.time));
         assert_eq!(points[..before.len()], before);
 
@@ -159,10 +192,36 @@ mod tests {
             frame.time = f64::from(step) * 1e-5;
             frame.joints[0].eccentricity.x = 1e-4 * f64::from(step % 3);
             paths.record(&frame);
-            assert!(paths.between(0, ALL.0, ALL.1).len() <= MAX_POINTS);
+            assert!(paths.between(0, 0, ALL.0, ALL.1).len() <= MAX_POINTS);
         }
-        assert_eq!(paths.between(0, 0.19999, ALL.1).len(), 1);
+        assert_eq!(paths.between(0, 0, 0.19999, ALL.1).len(), 1);
         // A ball at rest is one point.
-        assert!(paths.between(1, ALL.0, ALL.1).len() == 1);
+        assert!(paths.between(1, 0, ALL.0, ALL.1).len() == 1);
+    }
+    #[test]
+    fn both_ends_of_a_pin_and_the_centre_of_a_block_keep_within_their_play() {
+        let pin = Scene::load("thrown-pin", &[]).expect("a benchmark");
+        let mut player = Player::new(&pin).expect("starts");
+        player.run_to(4e-3);
+        let ends = [0, 1].map(|number| player.paths().between(0, number, ALL.0, ALL.1));
+        let far = |points: &[Point]| points.iter().map(|p| p.position[1].hypot(p.position[2])).fold(0.0, f32::max);
+        for points in ends {
+            // Across the axis, which is x, the end reaches the wall and the depth of a contact beyond it, 1 um.
+            assert!(points.len() > 100 && (far(points) / 1e-4 - 1.0).abs() < 0.1, "{}", far(points));
+        }
+        assert!(ends[0][ends[0].len() / 2].position != ends[1][ends[1].len() / 2].position, "it tilts");
+        assert!(player.paths().between(0, 2, ALL.0, ALL.1).is_empty());
+        let slide = Scene::load("slider-crank-worn", &[]).expect("built in");
+        let joint = slide.machine.loose_joints.iter().position(|joint| joint.name == "guide").expect("a slide");
+        let mut player = Player::new(&slide).expect("starts");
+        player.run_to(0.05);
+        let (points, report) = (player.paths().between(joint, 0, ALL.0, ALL.1), player.frame().joints[joint]);
+        // The guide is that of the world.
+        let axes = player.frame().axes_of(&slide.machine.loose_joints[joint].frames[0]);
+        let last = axes.tr_mul(&Vec3::from(points.last().expect("it moved").position.map(f64::from)));
+        assert!((last.x - report.axial).abs() < 1e-4 && last.y.abs() < 1.1 * report.clearance, "{last}");
+        let along = |point: &Point| axes.column(0).dot(&Vec3::from(point.position.map(f64::from)));
+        let [low, high] = [f64::min, f64::max].map(|of| points.iter().map(along).reduce(of).expect("points"));
+        assert!(high - low > 10.0 * report.clearance, "{low} to {high}");
     }
 }

@@ -183,7 +183,7 @@ impl Player {
         &self.frame
     }
 
-    /// Largest forces since the previous frame, per ball joint.
+    /// Largest forces since the previous frame, per joint with play.
     pub fn peaks(&self) -> &[Peak] {
         &self.record.peaks
     }
@@ -193,7 +193,7 @@ impl Player {
         &self.record.channels
     }
 
-    /// Record channels that hold the clearances of the ball joints over time.
+    /// Record channels that hold the clearances of the joints with play over time.
     pub fn clearances(&self) -> std::ops::Range<usize> {
         self.record.channels.len()..self.record.history.channels() - self.record.channels.picked().len()
     }
@@ -234,7 +234,7 @@ impl Player {
         &self.record.history
     }
 
-    /// The recent paths of the balls.
+    /// The recent paths of the parts of joints with play.
     pub fn paths(&self) -> &Paths {
         &self.record.paths
     }
@@ -644,7 +644,7 @@ impl Player {
     }
 
     /// Value of `key` after [`Self::set_original`]: that of the scene file, or what it follows there, such as the common value of the
-    /// ball joints.
+    /// joints with play.
     pub fn original(&self, key: &str) -> Option<Value> {
         self.pending().value_without_change(&self.original, key)
     }

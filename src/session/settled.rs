@@ -35,7 +35,7 @@ const INSTANTS: f64 = 16.0;
 struct Instant {
     time: f64,
     points: Vec<Vec3>,
-    /// Normal force by ball joint, N; empty without a drive.
+    /// Normal force by joint with play, N; empty without a drive.
     loads: Vec<f64>,
 }
 

@@ -20,7 +20,7 @@ pub enum Mesh {
     Cube,
     /// Half of a spherical shell of outer radius 1, open towards +z; [`Instance::inner_radius`] is its inner radius.
     Socket,
-    /// `DrawList::plates[i]`: one cell per zone of the wear maps, then the plates of the scene.
+    /// `DrawList::plates[i]`: those of the cells of wear maps, then the plates of the scene.
     Plate(u16),
 }
 

@@ -62,7 +62,7 @@ enum JointEnd {
     Socket(usize),
 }
 
-/// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates and the
+/// Shapes of `scene`, and the meshes that are not shared: those of wear maps, then its plates and the
 /// meshes of its files.
 pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
     let mut meshes = Meshes { data: zones::meshes(), from_files: Vec::new() };

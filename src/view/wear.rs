@@ -1,20 +1,17 @@
-//! The wear map: cells of the sockets' inner faces coloured by the impulse or the friction work they received.
+//! The wear map: cells of the walls of joints with play coloured by the impulse or the friction work they received.
 
-use glam::{Mat3, Vec3};
+use glam::Mat3;
 
 use super::instances::placed;
 use super::joint;
 use super::relative::RelativeShot;
 use super::solids::Pose;
 use super::theme::Material;
-use super::{Colour, DrawList, Mesh, SceneView, Shot, WearMap, WearScale};
-use crate::machine::LooseKind;
+use super::{Colour, DrawList, SceneView, Shot, WearMap, WearScale};
 use crate::simulate::{Cell, Wear};
 
 /// Decades of the scale below the largest value.
 const DECADES: f32 = 3.0;
-/// Radius of the drawn cells, in inner radii of the socket: just in front of its wall.
-const CELL_RADIUS: f32 = 0.99;
 
 impl WearMap {
     /// Magnitude of the value of a cell per square millimetre of its `area` (m^2).
@@ -72,11 +69,12 @@ impl SceneView {
         }
         let relative = RelativeShot::of(shot);
         let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
-        // The cells are those of sockets.
-        let loose = shot.scene.machine.loose_joints.iter().zip(&shot.frame.joints).enumerate();
-        let joints = loose.filter(|(_, (joint, _))| joint.kind == LooseKind::Ball).map(|(j, _)| j);
-        let value = |joint: usize, cell: &Cell| map.value(cell, wear.area(joint));
-        let values = joints.clone().flat_map(|j| wear.cells(j).iter().map(move |cell| value(j, cell)));
+        let joints = 0..shot.scene.machine.loose_joints.len();
+        let valued = |j: usize| {
+            let cells = wear.division(j).each().zip(wear.cells(j));
+            cells.map(move |((part, cell), totals)| (part, cell, map.value(totals, part.area)))
+        };
+        let values = joints.clone().flat_map(|j| valued(j).map(|(.., value)| value));
         let scale = WearScale { map, largest: values.fold(0.0, f32::max) };
         out.wear_scale = Some(scale);
         if scale.largest <= 0.0 {
@@ -85,21 +83,15 @@ impl SceneView {
         let drawn = joint::joints(shot.scene, shot.frame, out.magnification);
         for j in joints {
             let body = Pose::in_frame(shot.frame, shot.scene.machine.loose_joints[j].carrier().body).rotation;
-            let grid = wear.grid_from_body(j);
+            let division = wear.division(j).axes();
             // Rows of a rotation are columns of its inverse.
-            let axis = |i: usize| super::to_f32(&grid.row(i).transpose());
-            let socket = body * Mat3::from_cols(axis(0), axis(1), axis(2));
-            let size = Mat3::from_diagonal(Vec3::splat(CELL_RADIUS * drawn[j].inner));
-            for (i, cell) in wear.cells(j).iter().enumerate() {
-                let value = value(j, cell);
-                if value <= 0.0 {
-                    continue;
-                }
-                let turn = Mat3::from_rotation_z(wear.grid().edges(i).azimuth[0] as f32);
+            let axis = |i: usize| super::to_f32(&division.row(i).transpose());
+            let axes = body * Mat3::from_cols(axis(0), axis(1), axis(2));
+            for (part, cell, value) in valued(j).filter(|(.., value)| *value > 0.0) {
                 let surface = Material { colour: WearScale::colour(scale.position(value)), roughness: 1.0, metal: 0.0 };
-                let mesh = Mesh::Plate(wear.grid().zone_of(i) as u16);
-                let cell = placed(socket * turn * size, drawn[j].socket_centre, surface);
-                out.wear.push(mesh, cell);
+                drawn[j].cell((part, cell), &axes, |mesh, linear, at| {
+                    out.wear.push(mesh, placed(linear, at, surface));
+                });
             }
         }
     }

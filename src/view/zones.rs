@@ -1,20 +1,33 @@
-//! Meshes of the cells of a socket's inner face, for the wear map.
+//! Meshes of the cells of wear maps.
 
-use super::MeshData;
-use crate::simulate::{Edges, Grid};
+use super::{Mesh, MeshData};
+use crate::simulate::Grid;
 
 /// Largest flat facet of a cell, rad.
 const MAX_FACET: f64 = 0.07;
 
-/// A mesh for each zone of the grid: its cell that begins at azimuth 0, on the unit sphere, seen from inside.
+/// A square of edge 1 about the origin across x, seen from -x.
+pub(super) const SQUARE: Mesh = Mesh::Plate(0);
+
+/// The cell of a socket's zone `zone` that begins at azimuth 0, on the unit sphere, seen from inside.
+pub(super) fn of_zone(zone: usize) -> Mesh {
+    Mesh::Plate(1 + zone as u16)
+}
+
+/// Both, in the order of their numbers.
 pub(super) fn meshes() -> Vec<MeshData> {
     let grid = Grid::of_sockets();
     let zones = (0..).map_while(|zone| grid.zone(zone));
-    zones.map(|cells| patch(&grid.edges(cells.start))).collect()
+    std::iter::once(square()).chain(zones.map(|cells| patch(grid.edges(cells.start)))).collect()
 }
 
-fn patch(edges: &Edges) -> MeshData {
-    let Edges { polar, azimuth } = *edges;
+fn square() -> MeshData {
+    let corners = [[0.5, -0.5], [-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]];
+    let vertices = corners.map(|[y, z]| ([0.0, y, z, 0.0], [-1.0, 0.0, 0.0]));
+    MeshData { vertices: vertices.to_vec(), indices: vec![0, 1, 2, 0, 2, 3] }
+}
+
+fn patch([polar, azimuth]: [[f64; 2]; 2]) -> MeshData {
     let parts = |[from, to]: [f64; 2]| ((to - from) / MAX_FACET).ceil() as u32;
     let (rows, columns) = (parts(polar), parts(azimuth));
     let mut mesh = MeshData::default();

@@ -98,17 +98,46 @@ fn impacts_of_a_pin_name_their_ends() {
 }
 
 #[test]
-fn balls_alone_have_wear_maps_and_all_kinds_reachable_sets() {
+fn wear_maps_name_the_sites_and_add_up_to_the_ledger() {
     let folder = folder();
-    fs::write(folder.path().join("own.toml"), THROWN).unwrap();
+    fs::write(folder.path().join("thrown.toml"), THROWN).unwrap();
     fs::write(folder.path().join("crank.toml"), CRANK).unwrap();
-    let refused = jointplay(folder.path(), "run own.toml --duration 1ms --wear worn.csv").expect(2).stderr;
-    assert!(refused.contains("--wear: only ball joints have a wear map, not J (revolute)"), "{refused}");
-    let run = "run crank.toml --set joint.S.clearance=0.1mm --duration 1ms --wear worn.csv";
-    let warned = jointplay(folder.path(), run).expect(0);
-    assert!(warned.stderr.contains("warning: --wear: only ball joints have a wear map, not J (cylindrical)"));
-    let rows = fs::read_to_string(folder.path().join("worn.csv")).unwrap();
-    assert!(rows.lines().skip(1).all(|row| row.starts_with("1,")) && rows.lines().count() > 100, "{rows}");
+    fs::write(folder.path().join("block.toml"), BLOCK).unwrap();
+    let faces = "--set joint.J.play.face_radius=13mm";
+    // Cells of each site, in the order of the joint's names; those divided by azimuth.
+    let cases = [
+        ("thrown.toml", "5ms", "J", vec![72, 72, 1, 1], 144),
+        (&format!("thrown.toml {faces}"), "5ms", "J", vec![72, 72, 4, 4], 152),
+        ("block.toml", "200ms", "J", vec![1; 4], 0),
+    ];
+    for (scene, duration, name, cells, divided) in cases {
+        let line = format!("run {scene} --duration {duration} --wear worn.json --summary json --force");
+        let outcome = jointplay(folder.path(), &line).expect(0);
+        assert!(!outcome.stderr.contains("wear"), "{}", outcome.stderr);
+        let summary: Json = serde_json::from_str(&outcome.stdout).unwrap();
+        let worn: Json = serde_json::from_str(&fs::read_to_string(folder.path().join("worn.json")).unwrap()).unwrap();
+        let column = |name: &str| worn["columns"][name].as_array().expect(name).clone();
+        let sum = |name: &str| column(name).iter().map(|value| value.as_f64().unwrap()).sum::<f64>();
+        let site = column("site");
+        let found = (0..cells.len()).map(|place| site.iter().filter(|own| own.as_f64() == Some(place as f64)).count());
+        assert_eq!(found.collect::<Vec<_>>(), cells, "{scene}");
+        assert_eq!(column("azimuth_from_rad").iter().filter(|edge| !edge.is_null()).count(), divided, "{scene}");
+        assert!(column("polar_from_rad").iter().all(Json::is_null), "{scene}");
+        let names = worn["meta"]["sites"][0].as_array().unwrap();
+        assert!(
+            names.len() == cells.len()
+                && names.iter().all(|site| site.as_str().unwrap().starts_with(&format!("{name}.")))
+        );
+        assert_eq!(sum("contacts"), summary["impacts"][name].as_f64().unwrap(), "{scene}");
+        let (work, loss) = (sum("friction_work_J"), summary["energy_J"]["friction_loss"].as_f64().unwrap());
+        assert!(sum("impulse_N_s") > 0.0 && (work - loss).abs() <= 1e-9 * loss, "{scene}: {work} {loss}");
+    }
+}
+
+#[test]
+fn all_kinds_have_reachable_sets() {
+    let folder = folder();
+    fs::write(folder.path().join("crank.toml"), CRANK).unwrap();
     // In the dead centre the play of the crank's pin is that of the slider.
     let map = jointplay(folder.path(), "map crank.toml --over crank.angle=0deg..10deg:2").expect(0).stdout;
     assert!(map.contains("crank.angle = 0 deg          0.5 mm") && map.contains("J (100 %)"), "{map}");

@@ -101,20 +101,24 @@ fn the_ideal_reference_motion_of_a_probe_resumes_too() {
 #[test]
 fn repeatedly_resumed_runs_and_wear_maps_equal_an_uninterrupted_run() {
     let folder = folder();
-    let run = |more: &str| {
-        let line = format!("run spcmm --quiet --force --summary json {more}");
+    let run = |scene: &str, more: &str| {
+        let line = format!("run {scene} --quiet --force --summary json {more}");
         jointplay(folder.path(), &line).expect(0).json()
     };
-    let uninterrupted = run("--duration 40ms --wear whole.csv");
-    run("--duration 7ms --save-state s1 --wear w.csv");
-    run("--duration 7ms --from-state s1 --save-state s2");
-    run("--duration 23.3ms --from-state s2 --save-state s3 --wear w.csv");
-    let last = run("--duration 40ms --from-state s3 --wear last.csv");
-    assert_eq!(uninterrupted["state_hash"], last["state_hash"]);
-    assert_eq!(uninterrupted["energy_J"], last["energy_J"]);
-    assert_eq!(rows(folder.path(), "whole.csv"), rows(folder.path(), "last.csv"));
+    // A pin and a block, and balls.
+    let mut uninterrupted = Json::Null;
+    for scene in ["slider-crank-worn", "spcmm"] {
+        uninterrupted = run(scene, "--duration 40ms --wear whole.csv");
+        run(scene, "--duration 7ms --save-state s1 --wear w.csv");
+        run(scene, "--duration 7ms --from-state s1 --save-state s2");
+        run(scene, "--duration 23.3ms --from-state s2 --save-state s3 --wear w.csv");
+        let last = run(scene, "--duration 40ms --from-state s3 --wear last.csv");
+        assert_eq!(uninterrupted["state_hash"], last["state_hash"], "{scene}");
+        assert_eq!(uninterrupted["energy_J"], last["energy_J"], "{scene}");
+        assert_eq!(rows(folder.path(), "whole.csv"), rows(folder.path(), "last.csv"), "{scene}");
+    }
     // A state saved at the start, and a wear map that begins late.
-    run("--duration 0s --save-state s0");
+    run("spcmm", "--duration 0s --save-state s0");
     let line = "run spcmm --duration 40ms --from-state s0 --wear late.csv --summary json";
     let outcome = jointplay(folder.path(), line).expect(0);
     assert!(outcome.stderr.contains("wear map begins"), "{}", outcome.stderr);
@@ -186,7 +190,7 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
         check_refused(same, 2, &["--from-state s: "]);
     }
     for (text, words) in [
-        (good.replace("\"state_format\":8", "\"state_format\":9"), "format 8"),
+        (good.replace("\"state_format\":9", "\"state_format\":10"), "format 9"),
         ("{}".to_owned(), "not a state"),
         ("[1, 2]".to_owned(), "not a state"),
         ("\u{0}\u{1b}[31m".to_owned(), "not a state"),

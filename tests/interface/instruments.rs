@@ -87,7 +87,7 @@ fn the_ball_centre_is_drawn_at_the_scaled_eccentricity() {
         assert!(expected.distance(circle.centre) < circle.radius + 1.0);
     }
     let path = harness.state().player().paths();
-    assert!(path.between(1, 0.0, 1.0).len() > 50);
+    assert!(path.between(1, 0, 0.0, 1.0).len() > 50);
 }
 
 #[test]

@@ -485,7 +485,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     class.key(Key::Space);
     class.frames(60);
     assert!(class.app().microscope().is_open());
-    assert!(class.app().player().paths().between(0, 0.0, 1.0).len() > 10);
+    assert!(class.app().player().paths().between(0, 0, 0.0, 1.0).len() > 10);
     class.finish_task("the ball in its gap");
 
     // 2: why the first impact comes at 7.8 ms: the impact with the ball's approach speed.
@@ -627,7 +627,7 @@ fn tasks_of_a_lecture_take_at_most_three_touch_gestures_on_a_phone() {
     class.frames(60);
     let microscope = class.app().microscope();
     assert!(microscope.is_open() && microscope.joint() == 0);
-    assert!(class.app().player().paths().between(0, 0.0, 1.0).len() > 10);
+    assert!(class.app().player().paths().between(0, 0, 0.0, 1.0).len() > 10);
     class.finish_task("the ball in its gap");
 
     // 2

@@ -130,7 +130,7 @@ fn a_bad_link_is_explained_over_the_paused_default_scene() {
         ("#scene=pendulum&log=AAAA", "cut short or damaged"),
         ("?speed=3", "unknown word"),
         ("?follow=joint.S9", "no such part; allowed: joint.S1,"),
-        ("?show=microscope.S9", "no such ball joint; allowed: S1,"),
+        ("?show=microscope.S9", "no such joint with play; allowed: S1,"),
     ] {
         assert!(AppOptions::from_link(link).is_err(), "{link}");
         let (mut harness, _) = open(AppOptions::from_link_or_default(link), LARGE);

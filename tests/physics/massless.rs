@@ -177,7 +177,7 @@ fn a_body_that_needs_its_mass_is_refused_with_its_line() {
     let good = hinges("0.5 rad");
     let cases = r#"
         parent = "inner" => parent = "outer" -> body.inner.mass = 0: only a body between joints may have no mass: it carries no body
-        [[joint]]; name = "x" => [[ball_joint]]; name = "b"; socket = { body = "world" }; ball = { body = "inner" }; [[joint]]; name = "x" -> body.inner.mass = 0: only a body between joints may have no mass: ball joint b is on it
+        [[joint]]; name = "x" => [[ball_joint]]; name = "b"; socket = { body = "world" }; ball = { body = "inner" }; [[joint]]; name = "x" -> body.inner.mass = 0: only a body between joints may have no mass: joint with play b is on it
         kind = "revolute"; child = "outer"; axis = [1, 0, 0]; start = { position = 0, velocity = "2 rad/s" } => kind = "free"; child = "outer"; start = { position = [0, 0, 0] } -> body.outer.mass = 0: only a body between joints may have no mass: it is carried by a free joint
         name = "outer"; mass = 0; inertia = [0, 0, 0] => name = "outer"; mass = 0; inertia = "1e-6 1e-6 1e-6 kg m^2" -> body.outer.mass = 0: out of range; allowed above 0
         name = "outer"; mass = 0 => name = "outer"; mass = "1 kg" -> allowed above 0; units

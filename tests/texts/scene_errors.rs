@@ -251,7 +251,7 @@ fn every_broken_line_is_reported_with_its_remedy() {
         (
             "start = \"as-given\"",
             "joint_contact = [{ name = \"S9\", friction = 0.1 }]",
-            &["my.toml:2:27", "joint_contact.S9.name", "no ball joint `S9`", "ball joints: S1"],
+            &["my.toml:2:27", "joint_contact.S9.name", "no joint with play `S9`", "joints with play: S1"],
         ),
         (
             "start = \"as-given\"",
@@ -378,7 +378,7 @@ fn changes_are_refused_with_key_value_and_range() {
         ("spcmm", "contact.clearance", "0.3", &["contact.clearance = 0.3", "needs a unit", "mm"]),
         ("spcmm", "contact.clearence", "0.3mm", &["contact.clearence = 0.3mm", "did you mean `contact.clearance`"]),
         ("spcmm", "clearance", "0.3mm", &["did you mean `contact.clearance`"]),
-        ("spcmm", "joint.S4.clearance", "0.3mm", &["joint.S4.clearance", "no ball joint `S4`", "S1, S2, S3"]),
+        ("spcmm", "joint.S4.clearance", "0.3mm", &["joint.S4.clearance", "no joint with play `S4`", "S1, S2, S3"]),
         ("spcmm", "joint.S1.clearence", "0.3mm", &["did you mean `joint.S1.clearance`"]),
         ("chain", "parameter.links", "3", &["did you mean `chain.links`"]),
         ("spcmm", "clearence", "0.3mm", &["clearence", "did you mean `contact.clearance`"]),
@@ -387,8 +387,8 @@ fn changes_are_refused_with_key_value_and_range() {
             "joint.crank.drive.velocit",
             "7 rad/s",
             &[
-                "`crank` is not a ball joint, and the file gives no such number of it (did you mean `joint.crank.drive.velocity`?)",
-                "Ball joints, B, C, have joint.<ball joint>.<key>; keys: clearance, friction,",
+                "`crank` is not a joint with play, and the file gives no such number of it (did you mean `joint.crank.drive.velocity`?)",
+                "Joints with play, B, C, have joint.<joint>.<key>; keys: clearance, friction,",
             ],
         ),
         ("spcmm", "chain.links", "4", &["chain.links = 4", "unknown key"]),

@@ -11,7 +11,7 @@ pub struct InitialPeaks {
     pub until: f64,
     /// Whether `may_continue` cut the run short.
     pub is_cut: bool,
-    /// Peaks of the ball joints.
+    /// Peaks of the joints with play.
     pub peaks: Vec<Peak>,
 }
 

@@ -39,7 +39,7 @@ pub struct ResultArray {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     columns: Vec<ResultArray>,
-    /// Ball joints whose quantities are recorded.
+    /// Joints with play whose quantities are recorded.
     joints: Vec<String>,
     probe: bool,
     /// Number of statistics of channels.
@@ -76,7 +76,7 @@ static POINT: [PointColumn; 12] = [
     ("energy_residual", false, |r, _| r.residual),
 ];
 
-/// As [`PointColumn`], per ball joint; the joint's name is prefixed.
+/// As [`PointColumn`], per joint with play; the joint's name is prefixed.
 type JointColumn = (&'static str, bool, fn(&JointResult) -> f64);
 
 const JOINT: [JointColumn; 6] = [

@@ -76,9 +76,9 @@ pub enum Span {
 pub struct Protocol {
     /// Length and observed part.
     pub span: Span,
-    /// Statistics of channels to record. If empty, the quantities of the ball joints and the probe are recorded.
+    /// Statistics of channels to record. If empty, the quantities of the joints with play and the probe are recorded.
     pub keep: Vec<ChannelStatistic>,
-    /// Whether to record the quantities of the ball joints and the probe in addition to statistics of channels.
+    /// Whether to record the quantities of the joints with play and the probe in addition to statistics of channels.
     pub joints: bool,
 }
 
@@ -151,7 +151,7 @@ impl From<Plan> for Protocol {
     }
 }
 
-/// Result for one ball joint.
+/// Result for one joint with play.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointResult {
     /// Name of the joint.
@@ -175,7 +175,7 @@ pub struct JointResult {
 pub struct PointResult {
     /// Time at which the divergence guard stopped the run, s from the point's start; `None` if it did not.
     pub stopped: Option<f64>,
-    /// Ball joints in scene order.
+    /// Joints with play in scene order.
     pub joints: Vec<JointResult>,
     /// Largest and root-mean-square distance of the probe tip from the ideal tip over the kept periods, m; `None` where
     /// the scene has no such reference.
@@ -475,7 +475,7 @@ struct Means {
     latest: f64,
     /// Time covered so far, s.
     span: f64,
-    /// Integral of the normal force per ball joint, N s.
+    /// Integral of the normal force per joint with play, N s.
     normal: Vec<f64>,
     /// Normal forces at the latest sample, N.
     normal_now: Vec<f64>,

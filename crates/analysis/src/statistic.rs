@@ -278,7 +278,7 @@ impl Accumulator {
         }
     }
 
-    /// The statistics, in the requested order. `peaks` are the largest normal forces of the ball joints of `machine` in
+    /// The statistics, in the requested order. `peaks` are the largest normal forces of the joints with play of `machine` in
     /// continuous time over the same span, N.
     pub(super) fn values(&self, machine: &Machine, peaks: impl Fn(usize) -> f64) -> Vec<f64> {
         let value = |(requested, tally): (&ChannelStatistic, &Tally)| match requested.peak_of(machine) {

@@ -46,7 +46,7 @@ struct Resolved {
 }
 
 impl Scene {
-    /// Keys (without prefix) in which ball joint `joint` differs from the scene's `contact.*`.
+    /// Keys (without prefix) in which joint with play `joint` differs from the scene's `contact.*`.
     pub fn overrides(&self, joint: usize) -> &[&'static str] {
         &self.overrides[joint]
     }
@@ -148,8 +148,8 @@ impl Scene {
         let names: Vec<&str> = balls.iter().map(|joint| joint.name.as_str()).collect();
         let listed = if names.len() > 12 { format!("{}, …", names[..12].join(", ")) } else { names.join(", ") };
         format!(
-            "`{first}` is not a ball joint, and the file gives no such number of it{near}; its numbers: {}. Ball joints, \
-             {listed}, have joint.<ball joint>.<key>; keys: {}",
+            "`{first}` is not a joint with play, and the file gives no such number of it{near}; its numbers: {}. Joints with play, \
+             {listed}, have joint.<joint>.<key>; keys: {}",
             if given.is_empty() { "none".to_owned() } else { given.join(", ") },
             parts.join(", ")
         )
@@ -336,7 +336,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Records that ball joint `joint` has its own value of the contact parameter `part`.
+    /// Records that joint with play `joint` has its own value of the contact parameter `part`.
     pub(super) fn add_override(&mut self, joint: usize, part: &'static str) {
         if !self.overrides[joint].contains(&part) {
             Arc::make_mut(&mut self.overrides)[joint].push(part);

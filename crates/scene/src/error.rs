@@ -129,9 +129,9 @@ pub(super) fn no_body<'a>(name: &str, names: impl Iterator<Item = &'a str> + Clo
     no_such(["body", "bodies"], name, names)
 }
 
-/// "No such ball joint", with the nearest name and all names.
+/// "No such joint with play", with the nearest name and all names.
 pub(super) fn no_ball_joint(name: &str, joints: &[super::LooseJoint]) -> String {
-    no_such(["ball joint", "ball joints"], name, joints.iter().map(|joint| joint.name.as_str()))
+    no_such(["joint with play", "joints with play"], name, joints.iter().map(|joint| joint.name.as_str()))
 }
 
 fn no_such<'a>([what, plural]: [&str; 2], name: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {

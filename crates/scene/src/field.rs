@@ -25,7 +25,7 @@ impl<T> Copy for Field<T> {}
 /// Where the value of a row is stored.
 #[derive(Clone, Copy, Debug)]
 pub enum Access {
-    /// In the contact parameters of the scene and of each ball joint.
+    /// In the contact parameters of the scene and of each joint with play.
     Contact(Field<contact::Parameters>),
     /// In the machine.
     Machine(Field<Machine>),

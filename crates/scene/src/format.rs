@@ -49,7 +49,7 @@ fn parameters(section: &str) -> Vec<FileKey> {
     table().iter().filter_map(own).collect()
 }
 
-/// Rows of the parameters that a ball joint may override.
+/// Rows of the parameters that a joint with play may override.
 fn contact_keys() -> Vec<FileKey> {
     let all = parameters("contact");
     let own = |key: &FileKey| contact_rows().any(|(part, _)| part == key.name);
@@ -89,8 +89,11 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
     ]
     .map(|key| key.default_text("none"));
     let place = place("the scene");
-    let joints =
-        [list_of(&JOINT_CONTACT, at_most(MAX_BALL_JOINTS, "ball joints"), "{ name = \"J2\", clearance = \"0.1 mm\" }")];
+    let joints = [list_of(
+        &JOINT_CONTACT,
+        at_most(MAX_BALL_JOINTS, "joints with play"),
+        "{ name = \"J2\", clearance = \"0.1 mm\" }",
+    )];
     FileTable::new(
         "scene",
         "the file",
@@ -193,7 +196,7 @@ static GRAVITY: LazyLock<FileTable> = LazyLock::new(|| {
 });
 
 static CONTACT: LazyLock<FileTable> = LazyLock::new(|| {
-    let help = "play, material and friction of every ball joint without values of its own";
+    let help = "play, material and friction of every joint with play without values of its own";
     FileTable::new("contact", "[contact]", help, parameters("contact").leak())
 });
 
@@ -256,7 +259,7 @@ static JOINT_CONTACT: LazyLock<FileTable> = LazyLock::new(|| {
     FileTable::new(
         "joint_contact",
         "[[joint_contact]]",
-        "contact parameters of one ball joint, such as one copy of a pattern",
+        "contact parameters of one joint with play, such as one copy of a pattern",
         concatenated(&[&name, &contact_keys()]),
     )
     .also(&CONTACT)

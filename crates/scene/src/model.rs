@@ -19,7 +19,7 @@ pub struct Scene {
     pub machine: Arc<Machine>,
     /// View settings.
     pub view: ViewSettings,
-    /// Keys (without prefix) in which each ball joint differs from the scene's `contact.*`.
+    /// Keys (without prefix) in which each joint with play differs from the scene's `contact.*`.
     pub(super) overrides: Arc<Vec<Vec<&'static str>>>,
     /// Parameters changed since the file was read, in order: key and value as a user would write them.
     pub changes: Vec<(String, String)>,
@@ -59,7 +59,7 @@ pub struct Source {
     /// The TOML text.
     pub text: Arc<str>,
     /// Byte offsets in the text for errors found after reading: each parameter in the text, by key; `closed_form` for its
-    /// section; `joint.<name>` for each ball joint.
+    /// section; `joint.<name>` for each joint with play.
     pub places: BTreeMap<String, usize>,
     /// Numbers parsed from the text, by key.
     pub numbers: BTreeMap<String, FileNumber>,

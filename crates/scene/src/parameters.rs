@@ -63,7 +63,7 @@ impl Scope {
     pub fn describe(self) -> &'static str {
         match self {
             Self::Every => "every scene",
-            Self::Contact => "every scene; also `joint.<name>.<key>` for one ball joint",
+            Self::Contact => "every scene; also `joint.<name>.<key>` for one joint with play",
             Self::Joint => "`joint.<name>.<key>` for one joint with a table `play`",
             Self::Own => "scenes whose file gives it",
         }

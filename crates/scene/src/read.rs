@@ -414,7 +414,7 @@ fn read_mechanism<'d>(
     read_output(top, scene, &file_order)
 }
 
-/// Reads every `[[joint_contact]]`: contact parameters of a ball joint in addition to those of its own entry.
+/// Reads every `[[joint_contact]]`: contact parameters of a joint with play in addition to those of its own entry.
 fn read_joint_contacts<'d>(top: &Section<'d>, scene: &mut Scene, places: &mut Places<'d>) -> Result<(), SceneError> {
     let mut names = Names::default();
     for node in lists(std::slice::from_ref(top), "joint_contact", Vec::new())? {

@@ -233,7 +233,7 @@ static TABLE: [Parameter; 25] = [
         Kind::Choice(Formulation::WORDS),
         Value::Choice("tree"),
         Scope::Every,
-        "Equations of motion. tree uses one coordinate for each degree of freedom that remains when the ball joints \
+        "Equations of motion. tree uses one coordinate for each degree of freedom that remains when the joints with play \
          are cut. \
          lagrange is the paper's: all bodies free, every joint a constraint with a multiplier, stabilised after \
          Baumgarte. Both give the same motion; tree is faster.",

@@ -168,7 +168,7 @@ fn set_joint_value(joints: Option<&mut Item>, name: &str, set: impl FnOnce(&mut 
     named.is_some_and(|entry| set(*entry))
 }
 
-/// Adds a `[[joint_contact]]` with `item` for the ball joint `name`.
+/// Adds a `[[joint_contact]]` with `item` for the joint with play `name`.
 fn add_joint_contact(document: &mut DocumentMut, name: &str, part: &str, item: Item) {
     let mut own = Table::new();
     own.insert("name", value(name));

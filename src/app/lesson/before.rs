@@ -25,7 +25,7 @@ pub struct PreviousWindow {
     pose: Option<CameraPose>,
     fitted_aspect: f32,
     followed: Option<ScenePart>,
-    /// Whether the microscope was open, and its ball joint.
+    /// Whether the microscope was open, and its joint with play.
     microscope: (bool, usize),
     ideal: bool,
     scale: f64,

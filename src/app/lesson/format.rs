@@ -70,7 +70,7 @@ pub enum Kind {
     Parameter(String),
     /// An instant named by texts and other measures.
     Instant,
-    /// A property of an impact of a ball joint.
+    /// A property of an impact of a joint with play.
     Impact {
         /// Name of the joint, or `any`.
         of: String,
@@ -79,7 +79,7 @@ pub enum Kind {
         /// The property.
         its: ImpactProperty,
     },
-    /// Number of finished impacts of a ball joint, or of all joints for `any`.
+    /// Number of finished impacts of a joint with play, or of all joints for `any`.
     Count {
         /// Name of the joint, or `any`.
         of: String,
@@ -111,7 +111,7 @@ impl Kind {
         }
     }
 
-    /// The ball joint of the measure.
+    /// The joint with play of the measure.
     pub fn joint(&self) -> Option<&str> {
         match self {
             Self::Impact { of, .. } | Self::Count { of } => Some(of),
@@ -161,7 +161,7 @@ pub struct Step {
     pub open: Option<Vec<PanelName>>,
     /// Whether a twin run starts with the step.
     pub twin: bool,
-    /// Labels of controls, and names of ball joints.
+    /// Labels of controls, and names of joints with play.
     pub highlight: Vec<String>,
     /// Expression of the instant at which the step ends.
     pub until: Option<String>,
@@ -178,7 +178,7 @@ pub struct Step {
 pub enum CameraTarget {
     /// The whole scene from a point of view.
     From(Preset),
-    /// A close-up of a ball joint, by its index.
+    /// A close-up of a joint with play, by its index.
     At(usize),
 }
 
@@ -568,7 +568,7 @@ impl Lesson {
             let mut names = scene.machine.loose_joints.iter().map(|joint| &*joint.name);
             if !names.clone().any(|name| name == joint) {
                 let known: Vec<&str> = names.by_ref().take(12).collect();
-                return Err(format!("no ball joint `{joint}`; allowed: any, {}", known.join(", ")));
+                return Err(format!("no joint with play `{joint}`; allowed: any, {}", known.join(", ")));
             }
         }
         let or = |text: Option<String>, default: &str| text.unwrap_or_else(|| default.to_owned());

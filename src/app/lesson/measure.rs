@@ -219,7 +219,7 @@ impl MeasuringRun {
         let joints = &self.scene.machine.loose_joints;
         joints.iter().position(|j| j.name == name).ok_or_else(|| {
             let known: Vec<&str> = joints.iter().map(|joint| &*joint.name).collect();
-            format!("no ball joint `{name}`; allowed: {}", known.join(", "))
+            format!("no joint with play `{name}`; allowed: {}", known.join(", "))
         })
     }
 

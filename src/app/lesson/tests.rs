@@ -101,7 +101,11 @@ fn errors_in_a_lesson_name_their_position_and_the_allowed_values() {
         ("scene = \"pendulum\"", "scene = \"pendulun\"", &["own.toml:2:9", "scene", "did you mean `pendulum`?"]),
         ("scene = \"pendulum\"", "scene = 3", &["own.toml:2:9", "scene", "expected a string"]),
         ("{ impact = 1 }", "{ impact = 0 }", &["own.toml:6:9", "measure.first", "allowed 1 and more"]),
-        ("{ impact = 1 }", "{ impact = 1, of = \"S9\" }", &["measure.first", "no ball joint `S9`; allowed: any, S1"]),
+        (
+            "{ impact = 1 }",
+            "{ impact = 1, of = \"S9\" }",
+            &["measure.first", "no joint with play `S9`; allowed: any, S1"],
+        ),
         ("{ impact = 1 }", "{ from = \"0 s\" }", &["measure.first", "allowed one: parameter, instant, impact"]),
         ("run = \"wide\"", "run = \"wild\"", &["measure.wide", "did you mean `wide`?", "allowed: wide"]),
         ("its = \"approach\"", "its = \"aproach\"", &["unknown variant `aproach`", "`approach`"]),

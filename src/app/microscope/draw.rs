@@ -183,29 +183,8 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     );
 
     let place = |v: Vec3| circle.centre + project(v) * scale;
-    let new_colour = colour(palette.trail);
-    let old_colour = sheet.faint.gamma_multiply(0.45);
-    let start = path.first().map_or(now, |point| point.time);
-    let age = (now - start).max(f64::MIN_POSITIVE);
-    let column = |i: usize| to_f32(&magnified.carrier.column(i).into_owned());
-    let carrier = glam::Mat3::from_cols(column(0), column(1), column(2));
     let ball_centre = place(to_f32(&report.eccentricity));
-    let mut before: Option<Pos2> = None;
-    for point in path {
-        let at = place(carrier * Vec3::from_array(point.position));
-        if let Some(from) = before {
-            if from.distance(at) < MIN_DISTANCE {
-                continue;
-            }
-            let fraction = ((point.time - start) / age) as f32;
-            let stroke = Stroke::new(1.2 + 0.6 * fraction, old_colour.lerp_to_gamma(new_colour, fraction));
-            painter.line_segment([from, at], stroke);
-        }
-        before = Some(at);
-    }
-    if let Some(from) = before {
-        painter.line_segment([from, ball_centre], Stroke::new(1.8, new_colour));
-    }
+    self::path(sheet, painter, path, now, place, ball_centre);
 
     let touches = magnified.touches;
     let contact = colour(palette.normal);
@@ -237,11 +216,47 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let beside = ruler + vec2(ARROW_LENGTH + 6.0, 0.0);
     sheet.words(beside, Align2::LEFT_CENTER, &words, moving);
     if path.len() > 1 {
-        let words = format!("path of {}", value::quantity(now - start, "ms", 3));
+        let words = format!("path of {}", path_length(path, now));
         let below = ruler + vec2(0.0, 9.0);
-        sheet.words(below, Align2::LEFT_TOP, &words, new_colour);
+        sheet.words(below, Align2::LEFT_TOP, &words, colour(palette.trail));
     }
     circle
+}
+
+/// A path up to the point `end`, which is there at `now`, s; it fades with age. `place` projects a position, world axes.
+pub fn path(sheet: &Sheet<'_>, painter: &Painter, points: &[Point], now: f64, place: impl Fn(Vec3) -> Pos2, end: Pos2) {
+    let new_colour = colour(sheet.palette.trail);
+    let old_colour = sheet.faint.gamma_multiply(0.45);
+    let start = points.first().map_or(now, |point| point.time);
+    let age = (now - start).max(f64::MIN_POSITIVE);
+    let column = |i: usize| to_f32(&sheet.magnified.carrier.column(i).into_owned());
+    let carrier = glam::Mat3::from_cols(column(0), column(1), column(2));
+    let mut before: Option<Pos2> = None;
+    for point in points {
+        let at = place(carrier * Vec3::from_array(point.position));
+        if let Some(from) = before {
+            if from.distance(at) < MIN_DISTANCE {
+                continue;
+            }
+            let fraction = ((point.time - start) / age) as f32;
+            let stroke = Stroke::new(1.2 + 0.6 * fraction, old_colour.lerp_to_gamma(new_colour, fraction));
+            painter.line_segment([from, at], stroke);
+        }
+        before = Some(at);
+    }
+    if let Some(from) = before {
+        painter.line_segment([from, end], Stroke::new(1.8, new_colour));
+    }
+}
+
+/// How long before `now` a path begins.
+fn path_length(points: &[Point], now: f64) -> String {
+    value::quantity(now - points.first().map_or(now, |point| point.time), "ms", 3)
+}
+
+/// The same as the end of a line of words; empty without a path.
+pub fn path_words(points: &[Point], now: f64) -> String {
+    if points.len() > 1 { format!(", path of {}", path_length(points, now)) } else { String::new() }
 }
 
 /// The world axes in the lower left corner of the picture.

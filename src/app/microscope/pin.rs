@@ -6,8 +6,9 @@ use glam::Vec3;
 use super::draw::{self, Sheet};
 use super::magnified_joint::MagnifiedJoint;
 use crate::app::overlay::colour;
+use crate::app::paths::{Point, ends_of_pin};
 use crate::app::value;
-use crate::machine::{EndsOn, Pin, Vec3 as Vector};
+use crate::machine::Pin;
 use crate::view::to_f32;
 
 /// Radius of the mark of the pin's axis, points.
@@ -31,19 +32,8 @@ pub fn across(magnified: &MagnifiedJoint, axes: [Vec3; 2]) -> [Vec3; 2] {
     [up.cross(towards), up]
 }
 
-/// Where the pin's axis is at the places `a` and `b`, from the bearing's axis, m, world axes.
-pub fn ends(magnified: &MagnifiedJoint, kind: &Pin) -> [Vector; 2] {
-    let [bearing, pin] = &magnified.axes;
-    let (a, b) = (bearing.column(0), pin.column(0));
-    let slope = b / a.dot(&b) - a;
-    let half = 0.5 * kind.length.unwrap_or_default();
-    // The ends are those of the bearing, past which the pin has slid, or those of the pin.
-    let slid = if kind.ends == EndsOn::Bearing { magnified.report.axial } else { 0.0 };
-    [-half, half].map(|x| magnified.report.eccentricity + slope * (x - slid))
-}
-
-/// Both sections, and the gaps of the collars. Returns what the picture shows.
-pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2]) -> &'static str {
+/// Both sections with the paths of the ends up to `now`, and the gaps of the collars. Returns what the picture shows.
+pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2], paths: [&[Point]; 2], now: f64) -> &'static str {
     let Sheet { painter, rect, palette, .. } = sheet;
     let magnified = sheet.magnified();
     let report = &magnified.report;
@@ -56,7 +46,7 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2]) -> &'static str {
     let wall = colour(palette.socket.colour.with_opacity(0.9));
     let force = |place: usize| magnified.places.get(place).map_or(0.0, |(_, site)| site.normal_force.norm());
     let largest = force(0).max(force(1));
-    for (place, axis) in ends(magnified, kind).iter().enumerate() {
+    for (place, axis) in ends_of_pin(kind, report, &magnified.axes).iter().enumerate() {
         let Some((name, site)) = magnified.places.get(place) else {
             continue;
         };
@@ -78,7 +68,9 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2]) -> &'static str {
             continue;
         }
         let project = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
-        let at = centre + project(to_f32(axis)) * (radius / report.clearance as f32);
+        let scaled = |v: Vec3| centre + project(v) * (radius / report.clearance as f32);
+        let at = scaled(to_f32(axis));
+        draw::path(sheet, painter, paths[place], now, scaled, at);
         if touches {
             let out = (at - centre).normalized();
             let (foot, along) = (centre + out * radius, vec2(-out.y, out.x) * 9.0);
@@ -102,18 +94,19 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2]) -> &'static str {
     let words = format!("tilt {tilt}, axial position {}", draw::length(report.axial, 3));
     let line = rect.top() + TITLE + room.y + 4.0;
     sheet.words(pos2(rect.center().x, line), Align2::CENTER_TOP, &words, sheet.ink);
-    let scale = match largest > 0.0 {
+    let mut scale = match largest > 0.0 {
         true => {
             format!("circle {}, longest arrow {}", draw::length(report.clearance, 3), value::quantity(largest, "N", 3))
         }
         false => format!("circle: clearance {}", draw::length(report.clearance, 3)),
     };
+    scale += &draw::path_words(paths[0], now);
     sheet.words(pos2(rect.center().x, line + 14.0), Align2::CENTER_TOP, &scale, sheet.faint);
     if has_faces {
         faces(sheet);
     }
     "Sections across the bearing at both ends. The circles are the clearance; the mark is the pin's axis, which leaves them only by \
-     the penetration. In contact mark and wall are orange, and the arrow is the normal force on the pin. The line below is the \
+     the penetration. Its path covers the latest six impacts and fades with age (recorded for the first 12 joints). In contact mark and wall are orange, and the arrow is the normal force on the pin. The line below is the \
      play along the axis, with the gaps of the collars: of a tilted pin they close before the mark reaches the end."
 }
 
@@ -174,7 +167,8 @@ mod tests {
                 let LooseKind::Pin(kind) = magnified.kind else {
                     panic!("a pin");
                 };
-                for (place, axis) in ends(&magnified, &kind).iter().enumerate() {
+                let ends = ends_of_pin(&kind, &magnified.report, &magnified.axes);
+                for (place, axis) in ends.iter().enumerate() {
                     let site = magnified.places[place].1;
                     // The gap neglects nothing but the square of the tilt: (2 c / L)^2 of c.
                     let gap = magnified.report.clearance - axis.norm();

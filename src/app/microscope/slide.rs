@@ -1,11 +1,14 @@
 //! Pictures of a block between the walls of its guide, with the gaps of its corners.
 
 use eframe::egui::{Align2, Rect, Shape, Stroke, pos2, vec2};
+use glam::Vec3;
 
 use super::draw::{self, Sheet};
 use crate::app::overlay::colour;
+use crate::app::paths::Point;
 use crate::app::value;
 use crate::machine::Slide;
+use crate::view::to_f32;
 
 /// Half length of the block, its half width, and the play, as fractions of the width and of the height of its picture.
 const HALF_LENGTH: f32 = 0.33;
@@ -34,8 +37,8 @@ pub fn places(is_planar: bool, view: usize, [x, across]: [usize; 2]) -> Vec<usiz
     }
 }
 
-/// One view across each pair of walls. Returns what the picture shows.
-pub fn draw(sheet: &Sheet<'_>, kind: &Slide) -> &'static str {
+/// One view across each pair of walls, with the path of the block's centre up to `now`. Returns what the picture shows.
+pub fn draw(sheet: &Sheet<'_>, kind: &Slide, path: &[Point], now: f64) -> &'static str {
     let magnified = sheet.magnified();
     let is_planar = kind.half_height.is_none();
     let views = if is_planar { 1 } else { 2 };
@@ -50,22 +53,39 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Slide) -> &'static str {
             0 => (report.clearance, kind.half_width),
             _ => (report.second_clearance, kind.half_height.unwrap_or_default()),
         };
-        one_view(sheet, rect, view, (play, half), largest);
+        one_view(sheet, rect, &View { axis: 1 + view, play, half: [kind.half_length, half], largest, path, now });
     }
     let tilt = value::quantity(report.tilt, "deg", 3);
     let mut words = format!("tilt {tilt}");
     if largest > 0.0 {
         words += &format!(", longest arrow {}", value::quantity(largest, "N", 3));
     }
+    words += &draw::path_words(path, now);
     let below = pos2(sheet.rect.center().x, sheet.rect.bottom() - 4.0);
     sheet.words(below, Align2::CENTER_BOTTOM, &words, sheet.ink);
     "The block between the walls of its guide, with the gap or the depth of each corner. The play is magnified until it can be \
      seen, by the factor given. A corner in contact is orange; its arrow is the normal force on the block. Of two corners behind \
-     each other the nearer to its wall is shown."
+     each other the nearer to its wall is shown. The path of the block's centre covers the latest six impacts and fades with age: along \
+     the guide it has the scale of the block (recorded for the first 12 joints)."
 }
 
-/// The view across the walls of y (`view` 0) or of z.
-fn one_view(sheet: &Sheet<'_>, rect: Rect, view: usize, (play, half): (f64, f64), largest: f64) {
+/// What one view shows.
+struct View<'a> {
+    /// Axis of the guide across the walls, 1 or 2, and the play there, m.
+    axis: usize,
+    play: f64,
+    /// Half length of the block, and half of its dimension across the walls, m.
+    half: [f64; 2],
+    /// The force of the longest arrow, N.
+    largest: f64,
+    path: &'a [Point],
+    now: f64,
+}
+
+/// The view across one pair of walls.
+fn one_view(sheet: &Sheet<'_>, rect: Rect, shown: &View<'_>) {
+    let &View { axis: number, play, half: [half_length, half], largest, path, now } = shown;
+    let view = number - 1;
     let Sheet { painter, palette, .. } = sheet;
     let magnified = sheet.magnified();
     let contact = colour(palette.normal);
@@ -102,9 +122,16 @@ fn one_view(sheet: &Sheet<'_>, rect: Rect, view: usize, (play, half): (f64, f64)
     if play <= 0.0 {
         return;
     }
-    // In the block, which moves.
-    let middle = outline[0].lerp(outline[2], 0.5);
-    sheet.words(middle, Align2::CENTER_CENTER, &scale, sheet.faint);
+    let [along, across] = [0, number].map(|i| to_f32(&magnified.axes[0].column(i).into_owned()));
+    let [stretch, factor] = [f64::from(long) / half_length, f64::from(gap) / play].map(|scale| scale as f32);
+    // The view goes along the guide with the block.
+    let at = magnified.report.axial as f32;
+    let scaled = |v: Vec3| centre + vec2((v.dot(along) - at) * stretch, -v.dot(across) * factor);
+    let block = to_f32(&magnified.report.eccentricity) + along * at;
+    draw::path(sheet, &painter.with_clip_rect(rect), path, now, scaled, scaled(block));
+    // In the block, which moves, below the path of its centre.
+    let below = outline[0].lerp(outline[2], 0.5) + vec2(0.0, 0.5 * wide);
+    sheet.words(below, Align2::CENTER_CENTER, &scale, sheet.faint);
     for signs in CORNERS {
         let (Some(place), at) = corner(signs) else {
             continue;

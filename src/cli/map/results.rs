@@ -54,7 +54,7 @@ impl Results {
         self.computed(point).and_then(|at_point| at_point.largest.as_ref()).map_or(UNKNOWN, |largest| largest.direction)
     }
 
-    /// Share of each ball joint in the support along the direction of the largest error, m; NaN without one.
+    /// Share of each joint with play in the support along the direction of the largest error, m; NaN without one.
     pub fn shares(&self, point: usize) -> Vec<f64> {
         let joints = self.map.scene().machine.loose_joints.len();
         let largest = self.computed(point).and_then(|at_point| at_point.largest.as_ref());
@@ -63,7 +63,7 @@ impl Results {
         shares
     }
 
-    /// Ball joint with the largest share of the largest error.
+    /// Joint with play with the largest share of the largest error.
     pub fn largest_joint(&self, point: usize) -> Option<usize> {
         let shares = self.shares(point);
         let most = (0..shares.len()).max_by(|&a, &b| shares[a].total_cmp(&shares[b]).then(b.cmp(&a)))?;

@@ -20,7 +20,7 @@ const WEAR: [(&str, WearMap); 2] = [("wear-impulse", WearMap::Impulse), ("wear-f
 pub enum ScenePart {
     /// A body, by index.
     Body(usize),
-    /// A ball joint, by index.
+    /// A joint with play, by index.
     Joint(usize),
     /// A fixed shape, by index.
     Fixed(usize),
@@ -53,7 +53,7 @@ pub enum PlotWindow {
 /// Instruments that are on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Instruments {
-    /// Name of the ball joint under the microscope.
+    /// Name of the joint with play under the microscope.
     pub microscope: Option<String>,
     /// The ideal motion beside the run.
     pub ideal: bool,

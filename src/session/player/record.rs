@@ -24,7 +24,7 @@ pub(super) struct Record {
     pub channels: Channels,
     /// Name patterns of the picked channels.
     pub picks: Vec<String>,
-    /// The channels, then the clearance of each recorded ball joint, then the picked channels.
+    /// The channels, then the clearance of each recorded joint with play, then the picked channels.
     pub history: History,
     /// Full-resolution record of the time window last retraced.
     pub detailed: Option<Box<History>>,

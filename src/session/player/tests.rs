@@ -650,7 +650,7 @@ fn resuming_from_the_past_abandons_later_changes() {
     assert_eq!(player.simulation().state_hash(), uninterrupted.simulation().state_hash());
 }
 
-/// Ball joint, start and peak time of every impact of an independent run up to `to`, s, sorted by peak time.
+/// Joint with play, start and peak time of every impact of an independent run up to `to`, s, sorted by peak time.
 fn peaks_of_run(player: &Player, to: f64) -> Vec<(usize, f64, f64)> {
     let mut simulation = Simulation::new(&player.running().machine).expect("starts");
     let (mut peaks, mut steps, mut impacts) = (Vec::new(), Vec::new(), Vec::new());

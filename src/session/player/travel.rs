@@ -24,7 +24,7 @@ const SEARCH_HORIZON: f64 = 5.0;
 /// A search for the next impact.
 #[derive(Clone, Copy)]
 pub(super) struct ImpactSearch {
-    /// Ball joint; `None` for any.
+    /// Joint with play; `None` for any.
     joint: Option<usize>,
     /// The peak must come after this instant, s.
     from: f64,
@@ -77,7 +77,7 @@ impl Player {
         self.abandoned_future().map_or(self.reached, |future| future.to)
     }
 
-    /// Contact states of the ball joints over time.
+    /// Contact states of the joints with play over time.
     pub fn contact_history(&self) -> &ContactHistory {
         &self.record.contact_history
     }
@@ -111,7 +111,7 @@ impl Player {
         self.travel(time);
     }
 
-    /// Goes to the peak of the next or previous impact of ball joint `joint` (`None`: any), or back to the start. If the next
+    /// Goes to the peak of the next or previous impact of joint with play `joint` (`None`: any), or back to the start. If the next
     /// peak is not known yet, the run continues to it, frame by frame.
     pub fn go_to_impact(&mut self, joint: Option<usize>, forward: bool) {
         let shown = self.pacer.shown();

@@ -3,13 +3,13 @@
 use glam::{Mat3, Quat, Vec3};
 use parry3d::query::Ray;
 
-use super::{DrawnJoint, DrawnKind, IDEAL_GAP, is_in_contact};
+use super::{CELL_RADIUS, DrawnJoint, DrawnKind, IDEAL_GAP, WEAR_OPACITY, is_in_contact};
 use crate::machine::{Geometry, LooseJoint};
-use crate::simulate::{Frame, JointReport};
+use crate::simulate::{Frame, JointReport, Part, Shape};
 use crate::view::cast::cast_ball;
 use crate::view::instances::{self, placed};
 use crate::view::theme::Material;
-use crate::view::{DrawList, Instance, Mesh, Palette, ViewOptions, WearMap, to_f32};
+use crate::view::{DrawList, Instance, Mesh, Palette, ViewOptions, WearMap, to_f32, zones};
 
 /// Largest drawn inner radius of a socket, in ball radii: it limits the magnification.
 const MAX_SOCKET_RADIUS: f32 = 4.2;
@@ -17,8 +17,6 @@ const MAX_SOCKET_RADIUS: f32 = 4.2;
 const WALL_THICKNESS: f32 = 0.26;
 /// Largest outer radius, in ball radii.
 pub const MAX_OUTER: f32 = MAX_SOCKET_RADIUS + WALL_THICKNESS;
-/// Opacity of a ball in front of a wear map.
-const WEAR_BALL_OPACITY: f32 = 0.25;
 
 pub fn drawn(joint: &LooseJoint, now: &JointReport, opening: Vec3, m: f32) -> DrawnJoint {
     let socket_centre = to_f32(&now.socket_centre);
@@ -71,9 +69,19 @@ pub fn push(
         out.solid.push(Mesh::Sphere, ball);
     } else {
         let [r, g, b, _] = ball.colour;
-        let colour = [r, g, b, WEAR_BALL_OPACITY];
+        let colour = [r, g, b, WEAR_OPACITY];
         out.clear_balls.push(Instance { colour, ..ball });
     }
+}
+
+/// A cell of the socket's inner face.
+pub fn cell(joint: &DrawnJoint, (part, cell): (&Part, usize), axes: &Mat3, mut visit: impl FnMut(Mesh, Mat3, Vec3)) {
+    let (Shape::Sphere { grid }, Some([azimuth, _])) = (&part.shape, part.edges(cell).azimuth) else {
+        return;
+    };
+    let size = Mat3::from_diagonal(Vec3::splat(CELL_RADIUS * joint.inner));
+    let linear = *axes * Mat3::from_rotation_z(azimuth as f32) * size;
+    visit(zones::of_zone(grid.zone_of(cell)), linear, joint.socket_centre);
 }
 
 pub fn cast(joint: &DrawnJoint, ray: &Ray, has_wall: bool) -> Option<f32> {

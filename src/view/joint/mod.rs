@@ -10,15 +10,15 @@ mod slide;
 #[cfg(test)]
 mod tests;
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use parry3d::query::Ray;
 
 use super::solids::Pose;
 use super::theme::Material;
-use super::{DrawList, Layer, Mesh, MeshData, Palette, ViewOptions, to_f32};
+use super::{DrawList, Layer, Mesh, MeshData, Palette, ViewOptions, WearMap, to_f32};
 use crate::machine::{self, Geometry, LooseJoint, LooseKind};
 use crate::scene::Scene;
-use crate::simulate::{ContactMode, Frame, JointReport, SiteReport};
+use crate::simulate::{ContactMode, Frame, JointReport, Part, SiteReport};
 
 pub(super) use ball::push_sockets;
 use pin::DrawnPin;
@@ -26,6 +26,10 @@ use slide::DrawnSlide;
 
 /// Gap drawn where there is no play, in radii of the pin or ball: two parts must not coincide.
 const IDEAL_GAP: f32 = 0.02;
+/// Radius of the drawn cells of a wear map, in inner radii of the wall: just in front of it.
+const CELL_RADIUS: f32 = 0.99;
+/// Opacity of a part in front of a wear map.
+const WEAR_OPACITY: f32 = 0.25;
 /// Largest sine of the angle between parallel lines.
 const MAX_SINE: f64 = 0.02;
 
@@ -203,16 +207,23 @@ impl DrawnJoint {
         (options, palette): (&ViewOptions, &Palette),
         out: &mut DrawList,
     ) {
+        // What hides a wear map is seen through.
+        let is_clear = options.wear != WearMap::Off && frame.joints[i].state != ContactMode::Ideal;
+        let seen = |material: Material| if is_clear { material.with_opacity(WEAR_OPACITY) } else { material };
+        let carried = |out: &mut DrawList, push: &dyn Fn(&mut Layer)| {
+            push(if is_clear { &mut out.faded } else { &mut out.solid });
+        };
         match &self.shape {
             DrawnKind::Ball => return ball::push(self, &frame.joints[i], (options, palette), out),
             DrawnKind::Pin(pin) => {
-                pin.push(self, palette, out);
+                carried(out, &|layer| pin.push_shaft(self, layer, seen(palette.ball)));
+                pin.push_collars(self, palette, &mut out.faded);
                 if let (true, Some(bearing)) = (options.sockets, fittings.bearing) {
                     pin.push_bearing(self, bearing, palette, &mut out.faded);
                 }
             }
             DrawnKind::Slide(slide) => {
-                slide.push_block(&mut out.solid, palette.material(machine::Role::Slider));
+                carried(out, &|layer| slide.push_block(layer, seen(palette.material(machine::Role::Slider))));
                 if options.sockets {
                     let span = fittings.guides.get(i).copied().unwrap_or_default();
                     slide.push_walls(self, span, palette, &mut out.faded);
@@ -228,6 +239,16 @@ impl DrawnJoint {
         self.contacts(&frame.joints[i], frame.sites_of(i), |contact| {
             out.solid.push(Mesh::Sphere, super::instances::ball(contact.point, radius, mark));
         });
+    }
+
+    /// Calls `visit` with the meshes, each with its linear map and its place, that make a cell of a wear map; `axes` are those of its
+    /// division.
+    pub fn cell(&self, cell: (&Part, usize), axes: &Mat3, visit: impl FnMut(Mesh, Mat3, Vec3)) {
+        match &self.shape {
+            DrawnKind::Ball => ball::cell(self, cell, axes, visit),
+            DrawnKind::Pin(pin) => pin.cell(self, cell, axes, visit),
+            DrawnKind::Slide(slide) => slide.cell(self, cell.0, visit),
+        }
     }
 
     fn mark_radius(&self) -> f32 {

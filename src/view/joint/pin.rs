@@ -4,34 +4,35 @@
 //! that of the bearing: the pin leans, but its sections stay circles across the bearing's axis. So it touches the wall of radius
 //! r + m c at its ends, or at the ends of the bearing, exactly when the real one does. Collars follow the tilt as planes.
 
-use std::f32::consts::PI;
+use std::f32::consts::{PI, TAU};
 
 use glam::{Mat3, Vec3};
 use parry3d::query::Ray;
 
-use super::{DrawnJoint, DrawnKind, IDEAL_GAP, MAX_SINE, column, ratio};
+use super::{CELL_RADIUS, DrawnJoint, DrawnKind, IDEAL_GAP, MAX_SINE, column, ratio};
 use crate::machine::{EndsOn, Geometry, LooseJoint, Pin, Role};
-use crate::simulate::{Frame, JointReport, SiteReport};
+use crate::simulate::{Frame, JointReport, Part, SiteReport};
 use crate::view::cast::cast as cast_solid;
 use crate::view::instances::placed;
 use crate::view::solids::{BarKind, Solid};
 use crate::view::theme::Material;
-use crate::view::{DrawList, Layer, Mesh, MeshData, Palette, to_f32};
+use crate::view::{Layer, Mesh, MeshData, Palette, to_f32, zones};
 
 /// Outer radius of a bearing, in inner radii.
 const OUTER: f32 = 1.24;
 /// Most play drawn across the axis, in radii of the pin and in lengths of the shorter part; most along it, in such lengths.
 const MAX_PLAY: [f32; 2] = [0.8, 0.2];
 const MAX_AXIAL_PLAY: f32 = 0.35;
-/// Length of the shorter part of a pin that does not tilt, in radii.
-const PLANAR_LENGTH: f32 = 1.2;
 /// How far the longer part is drawn beyond the shorter, if that is not known, in lengths of the shorter.
 const OVERHANG: f32 = 0.25;
-/// Radius and thickness of a collar, in radii of the pin; radius of the shaft from a short pin to its collars.
-const COLLAR: [f32; 2] = [1.3, 0.14];
+/// Thickness of a collar, in radii of the pin; radius of the shaft from a short pin to its collars.
+const COLLAR: f32 = 0.14;
 const NECK: f32 = 0.45;
 /// Opacity of the half of a bearing that remains, of the half that is cut away, and of a collar.
 const OPACITY: [f32; 3] = [0.42, 0.07, 0.62];
+/// Width of the ring that shows the wear of a face, in radii of its collar; most that a flat facet of a cell turns, rad.
+const FACE_RING: f32 = 0.2;
+const FACET: f32 = TAU / 72.0;
 /// Sectors of half a bearing.
 const SECTORS: u32 = 48;
 
@@ -50,6 +51,8 @@ pub struct DrawnPin {
     /// Distance of the places `a` and `b` from the middle of the part that has ends, m.
     end: f32,
     ends: EndsOn,
+    /// Whether it touches at one place, from end to end.
+    is_planar: bool,
     collars: Option<Collars>,
 }
 
@@ -64,7 +67,7 @@ struct Collars {
 
 /// Half length of the shorter part.
 fn half_length(kind: &Pin, radius: f32) -> f32 {
-    0.5 * kind.length.map_or(PLANAR_LENGTH * radius, |length| length as f32)
+    0.5 * kind.seat_length(f64::from(radius)) as f32
 }
 
 pub fn drawn(
@@ -97,7 +100,7 @@ pub fn drawn(
     let face_play = if axial_play { m * now.second_clearance as f32 } else { IDEAL_GAP * radius };
     let collars = (kind.kept && kind.length.is_some()).then(|| {
         let contact = kind.face_radius.map(|radius| radius as f32);
-        let hides = (OUTER * inner).min(COLLAR[0] * radius);
+        let hides = (OUTER * inner).min(kind.collar_radius(f64::from(radius)) as f32);
         Collars { radius: contact.map_or(hides, |contact| contact.max(1.02 * radius)), contact, play: face_play }
     });
     let beyond = kind.travel.map_or(2.0 * OVERHANG * short, |travel| travel as f32).max(0.3 * radius);
@@ -105,13 +108,13 @@ pub fn drawn(
     let (bearing, pin) = match kind.ends {
         EndsOn::Pin if kind.length.is_some() => (long, short),
         // It carries its collars.
-        EndsOn::Bearing | EndsOn::Pin if collars.is_some() => (short, long.max(short + face_play + COLLAR[1] * radius)),
+        EndsOn::Bearing | EndsOn::Pin if collars.is_some() => (short, long.max(short + face_play + COLLAR * radius)),
         EndsOn::Bearing | EndsOn::Pin => (short, long),
     };
     let cut = opening.reject_from_normalized(axis).try_normalize().unwrap_or(axis.any_orthonormal_vector());
     let ball_centre = socket_centre + m * eccentricity + slope * from + axis * at;
-    let shape = DrawnPin { axis, cut, slope, at, bearing, pin, end: short, ends: kind.ends, collars };
-    let planar = kind.length.is_none();
+    let is_planar = kind.length.is_none();
+    let shape = DrawnPin { axis, cut, slope, at, bearing, pin, end: short, ends: kind.ends, is_planar, collars };
     DrawnJoint {
         socket_centre,
         ball_centre,
@@ -121,7 +124,7 @@ pub fn drawn(
         outer: OUTER * inner,
         reach: bearing.max(pin).hypot(OUTER * inner),
         // A pin that stays in its plane is seen along its axis.
-        opening: if planar { axis * if opening.dot(axis) < 0.0 { -1.0 } else { 1.0 } } else { cut },
+        opening: if is_planar { axis * if opening.dot(axis) < 0.0 { -1.0 } else { 1.0 } } else { cut },
         shape: DrawnKind::Pin(shape),
     }
 }
@@ -177,17 +180,16 @@ impl DrawnPin {
         };
         push(self.pin, joint.ball_radius);
         if let Some(collars) = self.collars {
-            let half = self.bearing + collars.play + COLLAR[1] * joint.ball_radius;
+            let half = self.bearing + collars.play + COLLAR * joint.ball_radius;
             if half > self.pin {
                 push(half, NECK * joint.ball_radius);
             }
         }
     }
 
-    pub fn push(&self, joint: &DrawnJoint, palette: &Palette, out: &mut DrawList) {
-        self.push_shaft(joint, &mut out.solid, palette.ball);
+    pub fn push_collars(&self, joint: &DrawnJoint, palette: &Palette, layer: &mut Layer) {
         if let Some(collars) = self.collars {
-            let thickness = COLLAR[1] * joint.ball_radius;
+            let thickness = COLLAR * joint.ball_radius;
             let material = palette.material(Role::Pin).with_opacity(OPACITY[2]);
             for side in [-1.0, 1.0] {
                 let [x, y] = [self.cut, self.axis.cross(self.cut)].map(|across| self.on_collar(&collars, across));
@@ -195,7 +197,7 @@ impl DrawnPin {
                 // Its inner face is at the gap; the mesh begins at the lower one.
                 let base = if side > 0.0 { face } else { face - self.axis * thickness };
                 let linear = Mat3::from_cols(x * collars.radius, y * collars.radius, self.axis * thickness);
-                out.faded.push(Mesh::Cylinder, placed(linear, base, material));
+                layer.push(Mesh::Cylinder, placed(linear, base, material));
             }
         }
     }
@@ -240,6 +242,47 @@ impl DrawnPin {
         side + if self.ends == EndsOn::Pin { self.at } else { 0.0 }
     }
 
+    /// Side of the bearing on which the face of place `place` is: moved towards +axis onto its front face, the pin's collar at the
+    /// other end touches.
+    fn face_side(place: usize) -> f32 {
+        if place == 2 { -1.0 } else { 1.0 }
+    }
+
+    /// A cell of the bearing's wall, from the end of the shorter part to its middle, or of the ring on a face.
+    pub fn cell(
+        &self,
+        joint: &DrawnJoint,
+        (part, cell): (&Part, usize),
+        axes: &Mat3,
+        mut visit: impl FnMut(Mesh, Mat3, Vec3),
+    ) {
+        let place = usize::from(part.place);
+        let [from, to] = part.edges(cell).azimuth.map_or([0.0, TAU], |edges| edges.map(|edge| edge as f32));
+        let facets = ((to - from) / FACET - 0.01).ceil().max(1.0);
+        let width = (to - from) / facets;
+        for facet in 0..facets as u32 {
+            let (sin, cos) = (from + width * (facet as f32 + 0.5)).sin_cos();
+            let out = axes.x_axis * cos + axes.y_axis * sin;
+            let wide = 2.0 * (0.5 * width).tan();
+            if place < 2 {
+                let end = self.end_at(place);
+                let inwards = if place == 0 { self.end } else { -self.end };
+                let [low, high] = [end, end + inwards * if self.is_planar { 2.0 } else { 1.0 }];
+                let (radius, along) = (CELL_RADIUS * joint.inner, self.axis * (high - low).abs());
+                let linear = Mat3::from_cols(out, self.axis.cross(out) * (wide * radius), along);
+                visit(zones::SQUARE, linear, joint.socket_centre + out * radius + self.axis * (0.5 * (low + high)));
+            } else {
+                let outwards = self.axis * Self::face_side(place);
+                let outer = self.collars.map_or(joint.outer, |collars| collars.radius);
+                let band = FACE_RING * outer;
+                // Seen from outside; just in front of the face.
+                let linear = Mat3::from_cols(-outwards, out * band, out.cross(outwards) * (wide * outer));
+                let above = self.bearing + (1.0 - CELL_RADIUS) * joint.ball_radius;
+                visit(zones::SQUARE, linear, joint.socket_centre + outwards * above + out * (outer - 0.5 * band));
+            }
+        }
+    }
+
     /// Where it touches, or would: of the ends `a` and `b`, of the collars `front` and `back`.
     pub fn site_point(&self, joint: &DrawnJoint, place: usize, site: &SiteReport) -> Vec3 {
         match place {
@@ -250,8 +293,7 @@ impl DrawnPin {
                 centre + out.normalize_or_zero() * joint.ball_radius
             }
             _ => {
-                // The pin has moved towards +axis onto its front face: the collar is at the other end.
-                let side = if place == 2 { -1.0 } else { 1.0 };
+                let side = Self::face_side(place);
                 let face = joint.socket_centre + self.axis * (side * self.bearing);
                 match self.collars.and_then(|collars| collars.contact) {
                     None => {

@@ -6,14 +6,14 @@
 use glam::{Mat3, Quat, Vec3};
 use parry3d::query::Ray;
 
-use super::{DrawnJoint, DrawnKind, IDEAL_GAP, MAX_SINE, column, ratio};
+use super::{CELL_RADIUS, DrawnJoint, DrawnKind, IDEAL_GAP, MAX_SINE, column, ratio};
 use crate::machine::{Geometry, LooseJoint, Mat3 as Matrix, Slide, Vec3 as Vector};
-use crate::simulate::{Frame, JointReport};
+use crate::simulate::{Frame, JointReport, Part};
 use crate::view::cast::cast as cast_solid;
 use crate::view::instances::placed;
 use crate::view::solids::Solid;
 use crate::view::theme::Material;
-use crate::view::{Layer, Mesh, Palette, to_f32};
+use crate::view::{Layer, Mesh, Palette, to_f32, zones};
 
 /// Most play drawn, in half lengths and in half widths of the block.
 const MAX_PLAY: [f32; 2] = [0.25, 0.6];
@@ -21,8 +21,6 @@ const MAX_PLAY: [f32; 2] = [0.25, 0.6];
 const WALL: f32 = 0.2;
 /// Least overhang of a guide beyond the block, in half lengths of it.
 const OVERHANG: f32 = 0.4;
-/// Half height of the block of a slide that stays in its plane, in half widths.
-const PLANAR_HEIGHT: f32 = 0.6;
 /// Opacity of the walls across y, of the rear wall across z, and of the one through which one looks.
 const OPACITY: [f32; 3] = [0.5, 0.28, 0.06];
 
@@ -44,8 +42,7 @@ pub struct DrawnSlide {
 }
 
 fn half(kind: &Slide) -> Vector {
-    let height = kind.half_height.unwrap_or(f64::from(PLANAR_HEIGHT) * kind.half_width);
-    Vector::new(kind.half_length, kind.half_width, height)
+    Vector::new(kind.half_length, kind.half_width, kind.seat_half_height())
 }
 
 pub fn drawn(
@@ -200,6 +197,21 @@ impl DrawnSlide {
             Vec3::new(beside.x, beside.y, (self.half.z + self.play[1]) * local.z.signum())
         };
         joint.socket_centre + self.guide * at
+    }
+
+    /// The part of a wall beside a corner of the block.
+    pub fn cell(&self, joint: &DrawnJoint, part: &Part, mut visit: impl FnMut(Mesh, Mat3, Vec3)) {
+        let place = usize::from(part.place);
+        let edges = self.edges_of(place);
+        let across = if self.is_planar || place % 2 == 0 { 1 } else { 2 };
+        let beside = 3 - across;
+        let mut at = edges * self.half * 0.5;
+        at[across] = edges[across] * CELL_RADIUS * (self.half[across] + self.play[across - 1]);
+        let normal = self.guide.col(across) * edges[across];
+        let size = self.half[beside] * if edges[beside] == 0.0 { 2.0 } else { 1.0 };
+        let second = self.guide.col(beside) * size;
+        let linear = Mat3::from_cols(normal, second, normal.cross(second).normalize() * self.half.x);
+        visit(zones::SQUARE, linear, joint.socket_centre + self.guide * at);
     }
 
     pub fn cast(&self, ray: &Ray) -> Option<f32> {

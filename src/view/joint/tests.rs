@@ -4,8 +4,10 @@ use glam::{Mat3, Vec3};
 
 use crate::machine::LooseKind;
 use crate::scene::Scene;
-use crate::simulate::{Frame, Simulation};
-use crate::view::{DrawList, Instance, LabelKind, Layer, Mesh, PeakMarks, SceneView, Shot, ViewOptions, to_f32};
+use crate::simulate::{Frame, Simulation, Wear};
+use crate::view::{
+    DrawList, Instance, LabelKind, Layer, Mesh, PeakMarks, SceneView, Shot, ViewOptions, WearMap, to_f32, zones,
+};
 
 /// A pin in the world that is thrown with spin and tilt, so that it touches with both ends and both collars; `play`: more keys.
 fn pin(play: &str) -> String {
@@ -56,7 +58,13 @@ fn scene(text: &str) -> Scene {
 
 /// Draws `frame` with its arrows.
 fn list(scene: &Scene, frame: &Frame) -> DrawList {
-    let options = ViewOptions { magnification: MAGNIFICATION, ..Default::default() };
+    list_with_wear(scene, frame, None)
+}
+
+/// The same with the impulses of a wear map.
+fn list_with_wear(scene: &Scene, frame: &Frame, wear: Option<&Wear>) -> DrawList {
+    let map = if wear.is_some() { WearMap::Impulse } else { WearMap::Off };
+    let options = ViewOptions { magnification: MAGNIFICATION, wear: map, ..Default::default() };
     let view = SceneView::new(scene, frame);
     let (mut camera, marks) = (view.camera(), PeakMarks::new());
     view.fit(&mut camera, scene, frame, &options, SIZE);
@@ -72,6 +80,7 @@ fn list(scene: &Scene, frame: &Frame) -> DrawList {
     };
     let mut out = DrawList::default();
     view.build(&shot, &mut out);
+    wear.into_iter().for_each(|wear| view.add_wear(&shot, wear, &mut out));
     assert_eq!(out.magnification, MAGNIFICATION, "fits");
     out
 }
@@ -306,4 +315,55 @@ fn a_past_peak_is_marked_at_the_end_that_was_hit() {
     // Displaced towards -axis, the pin is pushed back by the collar in front of the bearing's end at +axis.
     let point = drawn.wall_point(x * 3.0, Some(3)) - drawn.socket_centre;
     assert!(point.distance(x * 0.012) < 1e-6, "{point}");
+}
+
+#[test]
+fn cells_of_a_wear_map_are_on_the_walls_where_the_parts_touch_and_are_seen_through_them() {
+    let cases = [
+        (pin("ends = \"bearing\", face_radius = \"13 mm\""), 1e-4, 2, 1e-4),
+        (pin("ends = \"pin\""), 1e-4, 2, 1e-4),
+        (block("planar = true"), 2e-4, 4, MAGNIFICATION * 2e-4),
+        (block("z = \"0.3 mm\", half_z = \"9 mm\""), 2e-4, 16, MAGNIFICATION * 3e-4),
+    ];
+    for (text, play, walls, slack) in cases {
+        let scene = scene(&text);
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
+        simulation.track_wear();
+        let (mut frame, mut found) = (Frame::default(), 0);
+        while simulation.time() < 20e-3 {
+            simulation.step().expect("runs");
+            simulation.sample_now(&mut frame);
+            if frame.sites.iter().all(|site| site.normal_force.norm() == 0.0)
+                || !simulation.statistics().steps.is_multiple_of(10)
+            {
+                continue;
+            }
+            simulation.commit_wear();
+            let wear = simulation.wear().expect("tracked");
+            let list = list_with_wear(&scene, &frame, Some(wear));
+            let drawn = super::joints(&scene, &frame, MAGNIFICATION);
+            let cells = of(&list.wear, zones::SQUARE);
+            for (place, site) in frame.sites.iter().enumerate().take(walls) {
+                if site.normal_force.norm() < 1.0 {
+                    continue;
+                }
+                // On the wall, which is behind x = 0 of one of the squares by a hundredth of the wall's distance, to the depth.
+                let in_front = 0.01 * 0.0165;
+                let point = drawn[0].site_point(place, site);
+                let holds = |cell: &Instance| {
+                    let (at, linear) = (in_mesh(cell, point), linear(cell));
+                    let off = at.x.abs() * linear.x_axis.length();
+                    // Tilt moves a corner along its wall by no more than the play across the others.
+                    let beyond = |share: f32, edge: Vec3| (share.abs() - 0.5) * edge.length();
+                    off < in_front - MAGNIFICATION * site.gap as f32 + tolerance(play)
+                        && beyond(at.y, linear.y_axis).max(beyond(at.z, linear.z_axis)) < slack
+                };
+                assert!(cells.iter().any(holds), "{text}, place {place} at {} s", frame.time);
+                found += 1;
+            }
+            let part = if walls == 2 { Mesh::Cylinder } else { Mesh::Cube };
+            assert!(of(&list.solid, part).is_empty(), "the part that hides the wall is seen through");
+        }
+        assert!(found > 5, "{text}: {found}");
+    }
 }

@@ -78,7 +78,7 @@ pub fn read_unchecked(scene: &Scene, key: &str, text: &str) -> Result<f64, Study
     }
 }
 
-/// Keys of the real-valued parameters of a scene: first its own, then those of each ball joint.
+/// Keys of the real-valued parameters of a scene: first its own, then those of each joint with play.
 fn real_keys(scene: &Scene) -> Vec<String> {
     let own = scene.parameters().into_iter();
     let own = own.filter(|parameter| matches!(parameter.kind, Kind::Number { .. })).map(|p| p.key.to_owned());

@@ -60,7 +60,7 @@ pub const NAMED: [NamedOutput; 5] = [
     NamedOutput {
         name: "peak-force",
         label: "Peak normal force",
-        help: "Largest normal force of any ball joint, in continuous time",
+        help: "Largest normal force of any joint with play, in continuous time",
         statistics: "*.normal:max",
         reduction: Reduction::Largest,
         unit: "N",
@@ -76,7 +76,7 @@ pub const NAMED: [NamedOutput; 5] = [
     NamedOutput {
         name: "impacts",
         label: "Impacts",
-        help: "Contacts begun in all ball joints",
+        help: "Contacts begun in all joints with play",
         statistics: "",
         reduction: Reduction::Sum,
         unit: "",

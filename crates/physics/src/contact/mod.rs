@@ -113,7 +113,7 @@ pub enum Elasticity {
     },
 }
 
-/// Contact parameters of a ball joint. SI units.
+/// Contact parameters of a joint with play. SI units.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct Parameters {
     /// Radial clearance c = R - r, m, or play to each wall; 0 makes the joint ideal in these directions.

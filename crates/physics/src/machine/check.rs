@@ -14,7 +14,7 @@ pub const MIN_IMPACT_STEPS: u64 = 5;
 /// Loosest tolerance at which impacts conserve energy to a few per cent.
 const LOOSEST_TOLERANCE: f64 = 1e-3;
 
-/// Maximum number of sentences about ball joints; one more stands for the rest.
+/// Maximum number of sentences about joints with play; one more stands for the rest.
 const MAX_LISTED: usize = 40;
 
 /// Largest accepted error of a law's restitution. The paper's 0.9, which its law turns into 0.913, is within it.
@@ -100,7 +100,7 @@ pub enum MachineFault {
     /// Contact parameters contradict one another.
     #[error("{joint}: {fault}")]
     Contact {
-        /// Name of the ball joint; "contact" for the machine as a whole.
+        /// Name of the joint with play; "contact" for the machine as a whole.
         joint: String,
         /// The contradiction.
         fault: ContactFault,
@@ -119,8 +119,8 @@ pub enum MasslessFault {
     #[error("it carries no body")]
     Leaf,
     /// A force on it would act on no mass before it reaches the joints.
-    #[error("ball joint {0} is on it")]
-    BallJoint(String),
+    #[error("joint with play {0} is on it")]
+    Loose(String),
 }
 
 impl Machine {
@@ -136,7 +136,7 @@ impl Machine {
             let why = match ball {
                 _ if joint.kind == JointKind::Free => MasslessFault::Free,
                 _ if self.joints.iter().all(|joint| joint.parent != Some(index)) => MasslessFault::Leaf,
-                Some(ball) => MasslessFault::BallJoint(ball.name.clone()),
+                Some(ball) => MasslessFault::Loose(ball.name.clone()),
                 None => return Ok(()),
             };
             Err((index, why))
@@ -457,7 +457,7 @@ impl Machine {
         (duration, (coefficients.friction * sliding / normal).max(1.0))
     }
 
-    /// Groups of ball joints with equal contact parameters, with their names.
+    /// Groups of joints with play with equal contact parameters, with their names.
     fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
         let mut joints: Vec<_> = self.loose_joints.iter().enumerate().collect();
         // No value is NaN: the parameter ranges exclude it.
@@ -536,10 +536,10 @@ impl ContactFault {
     }
 }
 
-/// A contradiction in the contact parameters of the machine, or of one of its ball joints, by index.
+/// A contradiction in the contact parameters of the machine, or of one of its joints with play, by index.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactConflict {
-    /// Ball joint; `None` for the machine as a whole.
+    /// Joint with play; `None` for the machine as a whole.
     pub joint: Option<usize>,
     /// The contradiction.
     pub fault: ContactFault,

@@ -12,7 +12,7 @@ pub struct Conditions {
     pub gravity: Vec3,
     /// As [`Machine::contact`].
     pub contact: contact::Parameters,
-    /// Contact parameters of each ball joint.
+    /// Contact parameters of each joint with play.
     pub joints: Vec<contact::Parameters>,
     /// As [`Machine::solver`].
     pub solver: Solver,

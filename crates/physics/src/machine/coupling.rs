@@ -1,4 +1,4 @@
-//! Which loose ball joints act on one another.
+//! Which joints with play act on one another.
 
 use super::{Formulation, Machine};
 
@@ -6,7 +6,7 @@ use super::{Formulation, Machine};
 /// as large (`mechanism::bounds`).
 const MAX_PRODUCTS: usize = 1 << 24;
 
-/// Ball joints with clearance that act on one another.
+/// Joints with play that act on one another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coupled {
     /// Those that share with another one what an impact accelerates: a tree of bodies, or trees that ideal joints connect.
@@ -16,7 +16,7 @@ pub struct Coupled {
 }
 
 impl Machine {
-    /// The loose ball joints that act on one another, in time linear in the size of the machine.
+    /// The joints with play that act on one another, in time linear in the size of the machine.
     pub fn coupled_joints(&self) -> Coupled {
         let tree_of = self.trees();
         let mut linked: Vec<usize> = (0..self.bodies.len()).collect();

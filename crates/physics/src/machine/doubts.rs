@@ -176,7 +176,7 @@ impl Warning {
         WarningKind(std::mem::discriminant(self), doubt)
     }
 
-    /// Key of the parameter concerned: `solver.step`, or a key without section that ball joints may override.
+    /// Key of the parameter concerned: `solver.step`, or a key without section that joints with play may override.
     pub fn key(&self) -> Option<&'static str> {
         match self {
             Self::Doubt(Doubt::Restitution { .. }) => Some("restitution"),

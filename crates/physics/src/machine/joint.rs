@@ -114,7 +114,7 @@ impl Joint {
     }
 }
 
-/// Kind of a joint other than a ball joint.
+/// Kind of a joint without play.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// No motion.

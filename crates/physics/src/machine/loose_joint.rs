@@ -94,6 +94,19 @@ pub struct Pin {
     pub travel: Option<f64>,
 }
 
+impl Pin {
+    /// Length L, m. The part that stays in its plane has none: 1.2 of its radii stand for it where one must be, as in the picture and
+    /// in areas of wear.
+    pub fn seat_length(&self, radius: f64) -> f64 {
+        self.length.unwrap_or(1.2 * radius)
+    }
+
+    /// Outer radius of the collars' faces, m: 1.3 radii of the pin stand for it if they touch on the axis.
+    pub fn collar_radius(&self, radius: f64) -> f64 {
+        self.face_radius.unwrap_or(1.3 * radius)
+    }
+}
+
 /// The part of a pin joint whose ends touch the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EndsOn {
@@ -121,6 +134,14 @@ pub struct Slide {
     pub half_height: Option<f64>,
     /// Radius of curvature of its corners, which sets their stiffness, m. It does not enter the geometry.
     pub corner_radius: f64,
+}
+
+impl Slide {
+    /// Half of its height, m. A block that stays in its plane has none: 0.6 of its half width stand for it where one must be, as in the
+    /// picture and in areas of wear.
+    pub fn seat_half_height(&self) -> f64 {
+        self.half_height.unwrap_or(0.6 * self.half_width)
+    }
 }
 
 /// A point of a body, or of the world, with axes.

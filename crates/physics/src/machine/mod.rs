@@ -47,13 +47,13 @@ pub type Quat = nalgebra::UnitQuaternion<f64>;
 
 /// A mechanism and everything needed to simulate and draw it.
 ///
-/// Cutting the ball joints and the joints that close loops leaves a forest: each body is attached to its parent by exactly one
+/// Cutting the joints with play and the joints that close loops leaves a forest: each body is attached to its parent by exactly one
 /// entry of `joints`, and parents come before children.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Machine {
     /// Gravity, world axes, m/s^2.
     pub gravity: Vec3,
-    /// Contact parameters of the machine as a whole; they also apply to loop-closing joints where these count as ball joints.
+    /// Contact parameters of the machine as a whole; they also apply to loop-closing joints where these count as joints with play.
     pub contact: contact::Parameters,
     /// Equations of motion.
     pub formulation: Formulation,
@@ -88,13 +88,13 @@ impl Machine {
         child
     }
 
-    /// Names of the cut joints in index order: ball joints, then loop-closing joints.
+    /// Names of the cut joints in index order: joints with play, then loop-closing joints.
     pub fn cut_joints(&self) -> impl Iterator<Item = &str> {
         let balls = self.loose_joints.iter().map(|joint| joint.name.as_str());
         balls.chain(self.closing_joints.iter().map(|joint| joint.name.as_str()))
     }
 
-    /// Joints other than ball joints: tree joints, then loop-closing joints.
+    /// Joints without play: tree joints, then loop-closing joints.
     pub fn kinematic_joints(&self) -> impl Iterator<Item = &Joint> + Clone {
         self.joints.iter().chain(&self.closing_joints)
     }

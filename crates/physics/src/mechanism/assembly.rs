@@ -6,7 +6,7 @@ pub struct Assembly {
     /// Displacement of each body from the guess.
     pub bodies: Vec<Placement>,
     /// Closed joint with the widest gap in the guess, and that gap (|Z_j - Z_i| of a ball joint), m. Other loop-closing joints
-    /// are numbered after the ball joints.
+    /// are numbered after the joints with play.
     pub widest: Option<(usize, f64)>,
     /// Loop-closing joint with the largest angular misalignment in the guess, and that angle, rad.
     pub most_turned: Option<(usize, f64)>,

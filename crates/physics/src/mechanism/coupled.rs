@@ -1,4 +1,4 @@
-//! Rows of three force components that are solved for together: ball joints, and force elements between two bodies.
+//! Rows of three force components that are solved for together: contacts, and force elements between two bodies.
 
 use super::MechanismError;
 use super::bounds::{Advice, Cost, CostlyTask};

@@ -46,10 +46,10 @@ enum Law {
     Element(Mat3),
 }
 
-/// A row that is solved for: a ball joint that is or may come into contact within the step, or an element that is stepped
+/// A row that is solved for: a contact that touches or may within the step, or an element that is stepped
 /// implicitly.
 struct SolvedRow {
-    /// Ball joints by index, then two rows per element, for its force and its torque.
+    /// Contacts by index, then two rows per element, for its force and its torque.
     index: usize,
     law: Law,
     step: ContactStep,
@@ -99,7 +99,7 @@ impl SolvedRow {
         }
     }
 
-    /// The law of a ball joint, with its row's number.
+    /// The law of a contact, with its row's number.
     fn contact(&self) -> Option<(usize, &Coefficients)> {
         match &self.law {
             Law::Contact(law) => Some((self.index, law)),
@@ -157,7 +157,7 @@ pub struct DiscreteGradient {
     powers: Powers,
 }
 
-/// A ball joint at the start of the step.
+/// A contact at the start of the step.
 #[derive(Clone, Copy, Default)]
 struct ContactStart {
     /// e, m.
@@ -184,7 +184,7 @@ pub struct StepStart<'a> {
     pub k: &'a [f64],
     /// Contact states.
     pub contact_states: &'a [ContactState],
-    /// [`ContactStep::rebound`] of each ball joint.
+    /// [`ContactStep::rebound`] of each contact.
     pub rebounds: &'a [Option<f64>],
 }
 
@@ -606,15 +606,14 @@ impl Mechanism {
         self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[positions..])
     }
 
-    /// The balls that touched in the latest such step, with the means over it; directions are those of the latest
+    /// What touched in the latest such step, with the means over it; directions are those of the latest
     /// evaluation.
     pub(crate) fn discrete_contacts(&self) -> impl Iterator<Item = (ContactId, elements::WallContact)> {
         let rows = self.discrete.iter().flat_map(|discrete| &discrete.rows);
         let contacts = rows.filter_map(|row| Some((row.contact()?.0, row)));
-        contacts.filter(|(_, row)| row.normal_force > 0.0).filter_map(|(contact, row)| {
+        contacts.filter(|(_, row)| row.normal_force > 0.0).map(|(contact, row)| {
             let (normal_force, friction_power) = (row.normal_force, row.friction_power);
-            let direction = self.wall_direction(contact)?;
-            Some((contact, elements::WallContact { direction, normal_force, friction_power }))
+            (contact, elements::WallContact { spot: self.spot(contact), normal_force, friction_power })
         })
     }
 

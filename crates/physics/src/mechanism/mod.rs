@@ -1,7 +1,7 @@
 //! Equations of motion of a scene.
 //!
-//! Ball joints, and other joints marked as loop-closing, are cut, so that every scene is a forest of trees. Each ball joint then
-//! adds either three constraint rows (ideal) or one contact force (clearance), any other cut joint up to six rows. A scene pays
+//! Joints with play, and other joints marked as loop-closing, are cut, so that every scene is a forest of trees. A joint with play then
+//! adds contact forces, constraint rows for what it does not leave free, or both; any other cut joint up to six rows. A scene pays
 //! only for what it contains.
 
 mod assembly;
@@ -59,6 +59,7 @@ pub use flight::{Flight, FreeFlightBody};
 pub use held::{HeldError, HeldMachine, drive_positions};
 pub(crate) use kinematics::angle_of;
 pub use kinematics::{Kinematics, Wrench};
+pub use loose::{Division, Edges, Grid, Part, Shape, Spot};
 pub use pairs::Opening;
 pub use reachable::{Farthest, TipFreedoms};
 pub use start::{OFF_PATH, poses_as_given};
@@ -653,7 +654,7 @@ impl Mechanism {
         all.map(|k| self.equations.closing_load(k))
     }
 
-    /// Number of cut joints: ball joints, then other joints that close loops.
+    /// Number of cut joints: joints with play, then other joints that close loops.
     pub fn cut_joints(&self) -> usize {
         self.model.joints.len() + self.model.closures.len()
     }

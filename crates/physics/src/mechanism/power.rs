@@ -3,6 +3,7 @@
 use super::elements::{ForceElement, Powers, WallContact};
 use super::equations::Equations;
 use super::kinematics::{Kinematics, Wrench};
+use super::loose::Spot;
 use super::model::{ContactId, Model, Motion};
 use super::{Latest, Mechanism};
 use crate::machine::Vec3;
@@ -76,16 +77,16 @@ impl Mechanism {
         powers
     }
 
-    /// The ball and its socket wall at contact `c` at the latest evaluation; `None` without contact force, and for another wall,
-    /// which has no map.
+    /// What presses against the wall of contact `c` at the latest evaluation; `None` without contact force.
     pub(crate) fn wall_contact(&self, c: ContactId) -> Option<WallContact> {
-        self.contacts.contact(c).wall_contact(self.motion())
+        let contact = self.contacts.contact(c);
+        contact.wall_contact(&self.model.joints[contact.site.joint].carrier, self.motion())
     }
 
-    /// Unit vector from the socket centre of contact `c` to the ball centre at the latest evaluation, in the axes of the socket's
-    /// body, where the two differ. It points to the point of the wall nearest to the ball. `None` for another wall.
-    pub(crate) fn wall_direction(&self, c: ContactId) -> Option<Vec3> {
-        self.contacts.contact(c).wall_direction(self.motion())
+    /// Where contact `c` touches, or would if it is near the wall, at the latest evaluation.
+    pub(crate) fn spot(&self, c: ContactId) -> Spot {
+        let contact = self.contacts.contact(c);
+        contact.spot(&self.model.joints[contact.site.joint].carrier, self.motion())
     }
 }
 

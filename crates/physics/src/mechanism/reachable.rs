@@ -37,7 +37,7 @@ pub struct Farthest {
     pub direction: Vec3,
     /// Support of the set along u to first order in the clearances, m.
     pub support: f64,
-    /// Part of each ball joint in it, c_k |l_k|, m.
+    /// Part of each joint with play in it, c_k |l_k|, m.
     pub shares: Vec<f64>,
     /// Error of the pose with displaced balls, m, world axes; `None` if its loops do not close.
     pub error: Option<Vec3>,

@@ -45,7 +45,7 @@ pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled,
     Ok(Settled { state, assembly })
 }
 
-/// `machine` with every ball joint ideal, in tree coordinates, to be assembled.
+/// `machine` with every joint with play ideal, in tree coordinates, to be assembled.
 pub(super) fn without_play(machine: &Machine) -> Machine {
     let mut ideal = machine.clone();
     for joint in &mut ideal.loose_joints {

@@ -200,7 +200,7 @@ impl Mechanism {
         Err(self.no_closure(constraints, tree, guess, y))
     }
 
-    /// A cut joint: `joint` counts ball joints, then other joints that close loops.
+    /// A cut joint: `joint` counts joints with play, then other joints that close loops.
     fn gap(&self, joint: usize, opening: Opening) -> OpenJoint {
         let ball = self.model.joints.get(joint).is_some_and(|joint| !joint.closed.turns());
         OpenJoint { joint: self.joint_names[joint].clone(), ball, opening }

@@ -21,11 +21,11 @@ pub struct Summary {
     pub dependent_rows: usize,
     /// Degrees of freedom left.
     pub degrees_of_freedom: usize,
-    /// Ideal ball joints.
+    /// Ideal joints among those that may have play.
     pub ideal_joints: usize,
-    /// Joints that close loops besides the ball joints.
+    /// Joints that close loops besides the joints with play.
     pub closing_joints: usize,
-    /// Ball joints with clearance: contacts evaluated at every step.
+    /// Places where joints with play can touch: contacts evaluated at every step.
     pub contacts: usize,
     /// Contacts with friction.
     pub frictional_contacts: usize,

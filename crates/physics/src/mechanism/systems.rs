@@ -22,7 +22,7 @@ impl Mechanism {
         self.evaluator_with_branches(active_set, &mut [])
     }
 
-    /// The same; it sets the entry in `has_left_branch` of each ball joint whose contact leaves the frozen branches of its laws
+    /// The same; it sets the entry in `has_left_branch` of each contact that leaves the frozen branches of its laws
     /// in an evaluation.
     pub(crate) fn evaluator_with_branches<'a>(
         &'a mut self,

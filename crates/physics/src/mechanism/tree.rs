@@ -1,4 +1,4 @@
-//! The tree formulation: coordinates of the spanning forest that remains once every ball joint is cut.
+//! The tree formulation: coordinates of the spanning forest that remains once every joint with play is cut.
 //!
 //! Mass matrix by the composite-rigid-body algorithm, bias by one outward and one inward pass (Featherstone 2008,
 //! chapters 5 and 6), in world axes with each body's own centroid as reference. Allocates nothing after `new`.

@@ -12,7 +12,7 @@ use crate::machine::{Freedom, Joint, JointKind, LooseJoint, LooseKind, Machine, 
 use std::borrow::Cow;
 use table::{Repetition, Signal, SignalSource, TABLE};
 
-/// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the memory.
+/// Largest number of joints with play and drives that are recorded: in a longer chain the rest is not worth the memory.
 pub const RECORDED_JOINTS: usize = 12;
 
 /// Largest number of channels picked by name: each costs as much memory as any other.
@@ -121,7 +121,7 @@ impl Channels {
         self.list.is_empty()
     }
 
-    /// Index of the normal force of ball joint `joint`, if it is recorded.
+    /// Index of the normal force of joint with play `joint`, if it is recorded.
     pub fn normal_force(&self, joint: usize) -> Option<usize> {
         let own = |c: &Channel| c.quantity == Quantity::NormalForce && c.reading.part == joint;
         self.list.iter().position(own)

@@ -3,7 +3,7 @@
 use crate::machine::{self, more};
 use crate::units::format_quantity_digits;
 
-/// Ball joints that a doubt concerns.
+/// Joints with play that a doubt concerns.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{worst}{}", more(*.others))]
 pub struct AffectedJoints {

@@ -161,7 +161,7 @@ pub struct SiteReport {
     pub contact_point: Vec3,
 }
 
-/// The largest force on a ball joint since the peaks were last taken.
+/// The largest force on a joint with play since the peaks were last taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Peak {
     /// Largest |F_N| in continuous time, N.

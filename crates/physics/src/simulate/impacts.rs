@@ -39,8 +39,8 @@ pub struct Impact {
     pub law: f64,
     /// Whether it began slower than `impact_speed_floor`: it then rebounds higher than requested.
     pub below_speed_floor: bool,
-    /// Whether another ball joint that acts on the same bodies was in contact meanwhile, or a live change altered the contact: the law alone then does not
-    /// determine its restitution.
+    /// Whether another contact that acts on the same bodies touched meanwhile, or a live change altered the contact: the law alone
+    /// then does not determine its restitution.
     pub disturbed: bool,
     /// Accepted steps from its beginning to its end; with fixed steps, including those in which it begins and ends.
     pub steps: u64,

@@ -1,4 +1,4 @@
-//! The largest loads of force elements and of all joints except ball joints.
+//! The largest loads of force elements and of all joints except those with play.
 
 use serde::{Deserialize, Serialize};
 

@@ -27,13 +27,14 @@ pub use simulation::{
     StateMismatch, Workspace, closed,
 };
 pub use stopped::{StopAdvice, StopFault, Stopped};
-pub use wear::{Cell, Edges, Grid, Wear};
+pub use wear::{Cell, Wear};
 
 use serde::{Deserialize, Serialize};
 
 use crate::machine::Vec3;
-pub use crate::mechanism::{Coordinate, Pull};
+pub use crate::mechanism::Coordinate;
 use crate::mechanism::{Counts, MechanismError};
+pub use crate::mechanism::{Division, Edges, Grid, Part, Pull, Shape, Spot};
 
 /// The longest run, s: at its end a double still resolves 0.1 ns.
 pub const MAX_RUN_DURATION: f64 = 1e6;
@@ -56,7 +57,7 @@ pub enum Effect {
 /// least-squares reactions and the forces that follow from them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Indeterminate {
-    /// Ball joints, by index; joints that close loops count after them.
+    /// Joints with play, by index; joints that close loops count after them.
     pub reactions: Vec<usize>,
     /// For each of these, the directions in which its force, and about which its torque, is indeterminate: orthogonal unit vectors,
     /// world axes. Across them the load is unique.
@@ -86,11 +87,11 @@ pub struct Statistics {
     pub stability_limited_time: f64,
     /// Largest constraint violation of the `lagrange` form so far, m (rad for orientation rows).
     pub constraint_drift: f64,
-    /// Of each ball joint.
+    /// Of each joint with play.
     pub joints: Vec<JointStatistics>,
 }
 
-/// What has happened in one ball joint since the last reset.
+/// What has happened in one joint with play since the last reset.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointStatistics {
     /// Contacts begun.

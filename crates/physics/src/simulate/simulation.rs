@@ -297,7 +297,7 @@ struct Attempt {
 enum IdealSource {
     /// There is no probe, or the drives' closed form gives it.
     ClosedForm,
-    /// Every ball joint is ideal: the motion is its own reference.
+    /// Every joint with play is ideal: the motion is its own reference.
     SelfReference,
     /// A simulation alongside.
     Simulated(Box<IdealModel>),
@@ -353,7 +353,7 @@ impl Simulation {
     /// Starts `machine` at t = 0.
     ///
     /// # Errors
-    /// If ball joints do not close, or the rods cannot follow the prescribed trajectory.
+    /// If joints with play do not close, or the rods cannot follow the prescribed trajectory.
     pub fn new(machine: &Machine) -> Result<Self, StartError> {
         let (model, workspace) = Model::with_workspace(machine)?;
         let observations = Observations::new(&model);
@@ -565,7 +565,7 @@ impl Simulation {
         self.run().indeterminate_forces()
     }
 
-    /// Moves the peaks of each ball joint since the last call into `out`, in joint order.
+    /// Moves the peaks of each joint with play since the last call into `out`, in joint order.
     pub fn take_peaks(&mut self, out: &mut Vec<Peak>) {
         out.clear();
         out.extend(self.state.joints.iter_mut().map(|joint| std::mem::take(&mut joint.peak)));

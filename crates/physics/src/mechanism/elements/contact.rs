@@ -1,10 +1,10 @@
-//! Contact of a loose joint, between a ball and the wall of its socket, by the laws in `contact`.
+//! A contact of a joint with play, between a part and a wall, by the laws in `contact`.
 
 use super::{ActiveSet, At, Coupling, ForceElement, Loads};
 use crate::contact::{Coefficients, Force, Separation};
 use crate::machine::Vec3;
 use crate::mechanism::kinematics::Kinematics;
-use crate::mechanism::loose::Wall;
+use crate::mechanism::loose::{Spot, Wall};
 use crate::mechanism::model::{Anchor, ContactId, Site};
 use crate::mechanism::{Powers, WallContact};
 
@@ -57,28 +57,22 @@ impl Contact {
         -gap.friction.dot(&surfaces)
     }
 
-    /// Contact between the ball and its socket wall at the latest evaluation; `None` without contact force.
-    pub fn wall_contact(&self, motion: &[Kinematics]) -> Option<WallContact> {
+    /// What presses against the wall at the latest evaluation; `None` without contact force. `centre` is the point of the joint's
+    /// carrier.
+    pub fn wall_contact(&self, centre: &Anchor, motion: &[Kinematics]) -> Option<WallContact> {
         if self.gap.normal_force <= 0.0 {
             return None;
         }
         Some(WallContact {
-            direction: self.wall_direction(motion)?,
+            spot: self.spot(centre, motion),
             normal_force: self.gap.normal_force,
             friction_power: self.friction_power(motion),
         })
     }
 
-    /// Unit vector from the socket centre to the ball centre at the latest evaluation, in the axes of the socket's body. It
-    /// points to the point of the wall nearest to the ball; the two centres must differ. `None` for another wall.
-    pub fn wall_direction(&self, motion: &[Kinematics]) -> Option<Vec3> {
-        let socket = &motion[self.site.carrier.body];
-        matches!(self.site.wall, Wall::Socket).then(|| socket.rotation.tr_mul(&self.direction()))
-    }
-
-    /// e / |e| of a ball off centre, whether or not `complete_separation` has been called.
-    pub fn direction(&self) -> Vec3 {
-        self.gap.eccentricity.normalize()
+    /// Where it touches the carrier of its joint, whose point is `centre`, at the latest evaluation, or would if it is near the wall.
+    pub fn spot(&self, centre: &Anchor, motion: &[Kinematics]) -> Spot {
+        self.site.spot(centre, &self.gap.eccentricity, motion)
     }
 
     /// e, or across a plane its part beyond it, m: a step's force is solved for by its length.

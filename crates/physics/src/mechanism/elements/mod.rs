@@ -1,4 +1,4 @@
-//! Force elements: everything that loads bodies without a constraint, one file per kind. Ball joints with clearance are among
+//! Force elements: everything that loads bodies without a constraint, one file per kind. The contacts of joints with play are among
 //! them; the others come from the scene's list, each kind with an entry below.
 
 mod bushing;
@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use super::drives::law_of;
 use super::kinematics::{Kinematics, Wrench};
+use super::loose::Spot;
 use super::model::{Anchor, Model};
 use crate::contact::{ContactState, Stiffness};
 use crate::machine::{self, Attachment, Element, ElementKind, JointCoordinate, LoadAxes, Machine, Mat3, Vec3};
@@ -150,7 +151,7 @@ pub(super) struct Loads<'a> {
     /// Loads on the bodies about their centroids; the last is the world's.
     pub(crate) wrench: &'a mut [Wrench],
     pub counts: &'a mut Counts,
-    /// By ball joint: set where a contact leaves the frozen branches of its laws. Empty if that is not recorded.
+    /// By contact: set where it leaves the frozen branches of its laws. Empty if that is not recorded.
     pub(crate) has_left_branch: &'a mut [bool],
 }
 
@@ -246,11 +247,11 @@ pub struct Powers {
     pub external: f64,
 }
 
-/// A ball that presses against the wall of its socket.
+/// A part that presses against a wall of its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WallContact {
-    /// Unit vector from the socket's centre to the point of contact, in the axes of the socket's body.
-    pub direction: Vec3,
+    /// Where.
+    pub spot: Spot,
     /// F_N, N.
     pub normal_force: f64,
     /// Power dissipated by friction, W.
@@ -312,7 +313,7 @@ pub(super) trait ForceElement: Send + Sync {
     /// coordinate, which counts turns, although it measures poses.
     fn set_angle_reference(&mut self, _reference: AngleReference) {}
 
-    /// Its report at `t`; empty for a ball joint, which is reported as a joint.
+    /// Its report at `t`; empty for a joint with play, which is reported as a joint.
     fn report(&self, _t: f64, _motion: &[Kinematics]) -> ElementReport {
         ElementReport::default()
     }

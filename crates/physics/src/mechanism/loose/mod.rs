@@ -1,17 +1,21 @@
 //! Kinds of joints with play, one file each.
 
 mod ball;
+mod division;
 mod implied;
 mod pin;
 mod slide;
+mod sphere;
 mod wall;
 
+pub use division::{Division, Edges, Part, Shape, Spot};
 pub use implied::drop_implied;
+pub use sphere::Grid;
 pub use wall::{Edge, Stiffness, Wall};
 
 use super::model::{Anchor, Frame, Pair, Site};
 use super::pairs::{Cut, Rows};
-use crate::machine::{JointKind, LooseKind};
+use crate::machine::{JointKind, LooseJoint, LooseKind};
 
 /// What distinguishes one kind of joint from another.
 pub struct Compiled {
@@ -30,6 +34,17 @@ impl LooseKind {
             Self::Ball => ball::compile(joint, frames),
             Self::Pin(pin) => pin::compile(pin, joint, frames, plays),
             Self::Slide(slide) => slide::compile(slide, joint, frames, plays),
+        }
+    }
+}
+
+impl LooseJoint {
+    /// Division of its surfaces into the cells of its wear map; without cells if it has no play.
+    pub fn division(&self) -> Division {
+        match &self.kind {
+            LooseKind::Ball => ball::division(self),
+            LooseKind::Pin(pin) => pin::division(pin, self),
+            LooseKind::Slide(slide) => slide::division(slide, self),
         }
     }
 }

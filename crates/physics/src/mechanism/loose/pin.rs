@@ -1,7 +1,11 @@
 //! A pin in a bearing: contacts at both ends of the shorter part, or one in the middle of a joint that does not tilt, and those of its
 //! collars (Ambrosio & Pombo 2018, Multibody System Dynamics 42, for the unified joint; the ends share the stiffness of the joint).
 
-use super::{Anchor, Compiled, Edge, Frame, JointKind, LooseKind, Pair, Site, Stiffness, Wall};
+use std::f64::consts::{PI, TAU};
+
+use super::{
+    Anchor, Compiled, Division, Edge, Frame, JointKind, LooseJoint, LooseKind, Pair, Part, Shape, Site, Stiffness, Wall,
+};
 use crate::machine::{EndsOn, Pin};
 
 pub(super) fn compile(pin: &Pin, joint: usize, frames: &[Frame; 2], [radial, axial]: [bool; 2]) -> Compiled {
@@ -81,4 +85,32 @@ fn faces(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> 
             [(-1.0, FACES[1]), (1.0, FACES[0])].into_iter().flat_map(of_side).collect()
         }
     }
+}
+
+/// Sectors of the wall of a bearing, 5 degrees each, and those of a face that touches at four points.
+const SECTORS: u16 = 72;
+const POINTS: u16 = 4;
+
+/// The wall of the bearing, half of the length of the shorter part for each end, and its faces. A pin shorter than its bearing takes
+/// these cells along the axis with it.
+pub(super) fn division(pin: &Pin, joint: &LooseJoint) -> Division {
+    let [radial, axial] = joint.contact.clearances().map(|play| play > 0.0);
+    let (radius, bore) = (joint.contact.ball_radius, joint.contact.ball_radius + joint.contact.clearance);
+    let mut parts = Vec::new();
+    if radial {
+        let places = if pin.length.is_some() { 2 } else { 1 };
+        let area = bore * (TAU / f64::from(SECTORS)) * pin.seat_length(radius) / f64::from(places);
+        parts.extend((0..places).map(|place| Part { place, shape: Shape::Ring { sectors: SECTORS }, area }));
+    }
+    if axial {
+        let outer = pin.collar_radius(radius);
+        let inner = if bore < outer { bore } else { 0.0 };
+        let area = PI * (outer * outer - inner * inner);
+        let (shape, area) = match pin.face_radius {
+            Some(_) => (Shape::Ring { sectors: POINTS }, area / f64::from(POINTS)),
+            None => (Shape::Whole, area),
+        };
+        parts.extend(FACES.map(|place| Part { place, shape: shape.clone(), area }));
+    }
+    Division::about_axis(&joint.frames[0], parts)
 }

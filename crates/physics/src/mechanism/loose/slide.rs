@@ -1,6 +1,6 @@
 //! A block in a guide: each corner touches its own walls (Flores et al. 2008, J. Comput. Nonlinear Dynam. 3, 011007, for the plane).
 
-use super::{Anchor, Compiled, Frame, JointKind, Pair, Rows, Site, Stiffness, Wall};
+use super::{Anchor, Compiled, Division, Frame, JointKind, LooseJoint, Pair, Part, Rows, Shape, Site, Stiffness, Wall};
 use crate::machine::Slide;
 
 pub(super) fn compile(slide: &Slide, joint: usize, frames: &[Frame; 2], [across, second]: [bool; 2]) -> Compiled {
@@ -41,4 +41,17 @@ pub(super) fn compile(slide: &Slide, joint: usize, frames: &[Frame; 2], [across,
     orientations.extend((!held.is_empty()).then_some(roll));
     let positions = held.iter().map(|axis| pair.along(*axis)).collect();
     Compiled { closed: pair.cut(), lasting: pair.keeping(positions, orientations), sites }
+}
+
+/// The walls beside the block, which takes the cells along the guide with it: of each wall a part for each of the corners there.
+pub(super) fn division(slide: &Slide, joint: &LooseJoint) -> Division {
+    let [x, y, z] = [slide.half_length, slide.half_width, slide.seat_half_height()];
+    // In a plane two corners are one.
+    let areas = [x * z * if slide.half_height.is_some() { 1.0 } else { 2.0 }, x * y];
+    let plays = joint.contact.clearances();
+    let parts = joint.kind.site_names().iter().zip(0..).filter_map(|(name, place)| {
+        let across = usize::from(name.ends_with('z'));
+        (plays[across] > 0.0).then(|| Part { place, shape: Shape::Whole, area: areas[across] })
+    });
+    Division::along_axes(&joint.frames[0], parts.collect())
 }

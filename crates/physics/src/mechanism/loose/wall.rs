@@ -1,6 +1,7 @@
 //! Surfaces that a point of the other body touches from inside, and where the forces act. Everything that a contact knows of its shape
 //! is here; a socket keeps the paper's two points of force.
 
+use super::Spot;
 use crate::contact::{Coefficients, ElasticLaw, Parameters, Separation};
 use crate::machine::{Mat3, Vec3};
 use crate::mechanism::kinematics::Kinematics;
@@ -170,6 +171,19 @@ impl Site {
             Wall::Socket | Wall::Bore(..) => e.norm(),
             Wall::Plane(normal) => (motion[self.carrier.body].rotation * normal).dot(&e),
         }
+    }
+
+    /// Where it touches the carrier of its joint, whose point is `centre`, with the carried point `e` from its foot.
+    pub fn spot(&self, centre: &Anchor, e: &Vec3, motion: &[Kinematics]) -> Spot {
+        let direction = match (self.wall, self.is_reversed) {
+            (Wall::Plane(normal), false) => normal,
+            // A point on the face of a bearing.
+            (Wall::Plane(_), true) => (self.carried.offset - centre.offset).normalize(),
+            (Wall::Socket | Wall::Bore(..), false) => motion[self.carrier.body].rotation.tr_mul(&e.normalize()),
+            // The pin touches on the other side of the bearing's axis.
+            (Wall::Socket | Wall::Bore(..), true) => motion[self.carried.body].rotation.tr_mul(&-e.normalize()),
+        };
+        Spot { place: self.place, direction }
     }
 
     /// Both points as they are now fixed to their bodies, each with its lever, m.

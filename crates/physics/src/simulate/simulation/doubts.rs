@@ -12,7 +12,7 @@ const MAX_BELOW_SPEED_FLOOR: f64 = 0.5;
 const MAX_PATCH: f64 = 1.0 / 3.0;
 /// Constraint violations above this fraction of the smallest clearance blur the effect of the clearance.
 const DRIFT_OF_CLEARANCE: f64 = 0.1;
-/// Limit on constraint violations if every ball joint is ideal, m.
+/// Limit on constraint violations if every joint with play is ideal, m.
 const DRIFT: f64 = 1e-4;
 /// Excess of damping over elastic force, compared with an undisturbed impact, beyond which a force is an artefact of the law.
 const MAX_DAMPING: f64 = 1.0;

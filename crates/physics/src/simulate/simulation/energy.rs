@@ -106,8 +106,7 @@ impl Stepping<'_> {
         wear.begin_step(reuses_start);
         for (c, (before, now)) in before.contact_states.iter().zip(&now.contact_states).enumerate() {
             if now.active && !before.active {
-                let direction = mechanism.wall_direction(c);
-                direction.iter().for_each(|at| wear.begin_contact(mechanism.contacts.joint_of(c), at));
+                wear.begin_contact(mechanism.contacts.joint_of(c), &mechanism.spot(c));
             }
         }
     }
@@ -150,7 +149,7 @@ impl Stepping<'_> {
         let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
         let powers = evaluator.powers(before.t + theta * h, scratch_y, scratch_k);
         if let Some(wear) = &mut state.record.wear {
-            // No quadrature node in a kinematic scene: no ball is in contact there.
+            // No quadrature node in a kinematic scene: nothing is in contact there.
             let instant = stepper.quadrature().iter().position(|at| *at == theta);
             wear.record_forces(instant.unwrap_or(0), mechanism);
         }

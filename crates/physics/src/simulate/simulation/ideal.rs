@@ -1,4 +1,4 @@
-//! Ideal motion with which a probe is compared. If it has no closed form, the same machine with every ball joint ideal is
+//! Ideal motion with which a probe is compared. If it has no closed form, the same machine with every joint with play ideal is
 //! simulated alongside.
 
 use serde::{Deserialize, Serialize};
@@ -172,7 +172,7 @@ impl IdealState {
     }
 }
 
-/// `machine` with every ball joint ideal, with the same drives and gravity, solved accurately enough to serve as a reference. It
+/// `machine` with every joint with play ideal, with the same drives and gravity, solved accurately enough to serve as a reference. It
 /// has no probe.
 pub fn closed(machine: &Machine) -> Machine {
     let mut ideal = machine.clone();

@@ -6,7 +6,9 @@ use super::{CLEARANCE_SPEED, Stepping};
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
 use crate::jet::Jet;
-use crate::machine::{AppliedForces, ControlFault, Drive, Element, ElementKind, ElementNumber, LiveElements, LooseJoint, Machine};
+use crate::machine::{
+    AppliedForces, ControlFault, Drive, Element, ElementKind, ElementNumber, LiveElements, LooseJoint, Machine,
+};
 use crate::mechanism::{ContactId, MechanismError, Pull, Ramp, law_of};
 use crate::simulate::Effect;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};

@@ -11,7 +11,7 @@ impl Model {
     /// Compiles `machine` and computes its start.
     ///
     /// # Errors
-    /// If ball joints do not close, or the rods cannot follow the prescribed trajectory.
+    /// If joints with play do not close, or the rods cannot follow the prescribed trajectory.
     pub fn new(machine: &Machine) -> Result<Self, StartError> {
         Self::with_workspace(machine).map(|(model, _)| model)
     }

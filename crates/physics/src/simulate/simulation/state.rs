@@ -140,7 +140,7 @@ impl State {
         AppliedForces { gravity: self.conditions.gravity, elements: self.elements.clone() }
     }
 
-    /// Clearance of ball joint `j`, m.
+    /// Clearance of joint with play `j`, m.
     pub fn clearance(&self, j: usize) -> f64 {
         self.plays(j)[0]
     }

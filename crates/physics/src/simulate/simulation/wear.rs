@@ -6,12 +6,11 @@ use crate::simulate::Wear;
 impl Stepping<'_> {
     /// As [`Simulation::track_wear`](crate::simulate::Simulation::track_wear).
     pub(in crate::simulate) fn track_wear(&mut self) {
-        let mut wear = Wear::new(self.machine);
+        let mut wear = Wear::new(self.machine, self.mechanism.contacts.len());
         self.evaluate_at(self.state.now.t);
         for (c, contact_state) in self.state.now.contact_states.iter().enumerate() {
             if contact_state.active {
-                let direction = self.mechanism.wall_direction(c);
-                direction.iter().for_each(|at| wear.begin_contact(self.mechanism.contacts.joint_of(c), at));
+                wear.begin_contact(self.mechanism.contacts.joint_of(c), &self.mechanism.spot(c));
             }
         }
         wear.commit_step();
