@@ -9,6 +9,8 @@ Quantities are floats in SI units, or text with a unit ("0.5 mm"). The same scen
 program `jointplay`: compare `Run.hash` with the state hash that `jointplay run` prints.
 """
 
+from ._compare import Comparison, compare
+from ._fit import FitStart, ParameterFit, fit
 from ._geometry import Shape
 from ._native import State, __version__
 from ._render import render
@@ -36,11 +38,13 @@ __all__ = [
     "Channel",
     "ChannelError",
     "Check",
+    "Comparison",
     "DoubtWarning",
     "Effects",
     "Ends",
     "Estimate",
     "FitChoice",
+    "FitStart",
     "Fits",
     "Frame",
     "InUseError",
@@ -50,6 +54,7 @@ __all__ = [
     "OmissionWarning",
     "OptionError",
     "Parameter",
+    "ParameterFit",
     "Quality",
     "Quantity",
     "RejectDriver",
@@ -70,6 +75,8 @@ __all__ = [
     "Tradeoff",
     "TradeoffRow",
     "__version__",
+    "compare",
+    "fit",
     "render",
     "sensitivity",
     "sweep",
