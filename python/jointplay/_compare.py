@@ -157,7 +157,9 @@ def read_measured(
         columns = {str(name): np.asarray(measured[name], dtype=float) for name in measured}
     clock = next((name for name in TIME if name in columns), None)
     if clock is None:
-        raise OptionError(f"{file}: a column {' or '.join(TIME)} is missing, with the times in s; there are: {', '.join(columns)}")
+        raise OptionError(
+            f"{file}: a column {' or '.join(TIME)} is missing, with the times in s; there are: {', '.join(columns)}"
+        )
     time = columns.pop(clock)
     wanted = list(columns) if channels is None else [channels] if isinstance(channels, str) else list(channels)
     found: dict[str, Array] = {}
@@ -173,7 +175,9 @@ def read_measured(
         raise OptionError(f"{file}: it has no column besides the time")
     for name, values in found.items():
         if values.shape != time.shape or time.ndim != 1:
-            raise OptionError(f"{file}: {name} has the shape {values.shape}, the time {time.shape}: expected two flat lists, equally long")
+            raise OptionError(
+                f"{file}: {name} has the shape {values.shape}, the time {time.shape}: expected two flat lists, equally long"
+            )
         if not np.isfinite(values).all():
             raise OptionError(f"{file}: {name} has no finite number in row {int(np.flatnonzero(~np.isfinite(values))[0]) + 1}")
     if len(time) < 4 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():

@@ -126,7 +126,9 @@ class _Model:
     def minimum(self, start: Array, step: float) -> Any:
         """The minimum that SciPy finds from a start."""
         solve = library("scipy.optimize").least_squares
-        return solve(self.residuals, start, lambda u: self.jacobian(u, step), bounds=(0.0, 1.0), x_scale=1.0, xtol=1e-9, ftol=1e-9)
+        return solve(
+            self.residuals, start, lambda u: self.jacobian(u, step), bounds=(0.0, 1.0), x_scale=1.0, xtol=1e-9, ftol=1e-9
+        )
 
 
 def fit(
@@ -202,9 +204,7 @@ def fit(
     )
 
 
-def _search(
-    minimum: Callable[[Array], Any], places: Array, threads: int, progress: Progress | None, ended: Event
-) -> list[Any]:
+def _search(minimum: Callable[[Array], Any], places: Array, threads: int, progress: Progress | None, ended: Event) -> list[Any]:
     """Minima from all places, in their order."""
     with ThreadPoolExecutor(min(threads, len(places))) as pool:
         tasks = [pool.submit(minimum, place) for place in places]

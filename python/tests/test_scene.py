@@ -64,7 +64,10 @@ def test_a_scene_survives_pickling(falling):
 
 
 def test_a_changed_scene_is_saved_with_its_changes(falling, tmp_path):
-    for scene in [jp.Scene.load("four-bar").set({"joint.A.clearance": 0.37e-3, "contact.friction": 0.11}), jp.Scene.from_toml(falling)]:
+    for scene in [
+        jp.Scene.load("four-bar").set({"joint.A.clearance": 0.37e-3, "contact.friction": 0.11}),
+        jp.Scene.from_toml(falling),
+    ]:
         file = tmp_path / "folder" / f"{scene.name}.toml"
         scene.save(file)
         saved = jp.Scene.load(file)

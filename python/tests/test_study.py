@@ -319,7 +319,10 @@ CLEARANCE = ["contact.clearance"]
         (lambda scene: jp.Study(scene, 5), "^over = 5: expected a mapping"),
         (lambda scene: jp.Study(scene, CLEARANCE, 5), "^output = 5: expected text"),
         (lambda scene: jp.tolerance(scene, CLEARANCE, 5), "^limits: "),
-        (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": [1.0, 2.0, 3.0]}), "expected an upper limit, or a lower and an"),
+        (
+            lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": [1.0, 2.0, 3.0]}),
+            "expected an upper limit, or a lower and an",
+        ),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, yield_="99%"), "^yield_ = '99%': allowed above 0"),
         (lambda scene: jp.sensitivity(scene, CLEARANCE, "tip-eror"), "^output: tip-eror: expected CHANNEL"),
         (lambda scene: jp.sensitivity(scene, CLEARANCE, "impacts,impacts"), "impacts: given twice"),

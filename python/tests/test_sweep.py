@@ -31,8 +31,8 @@ CASES = [
     (
         "slider-crank-driven",
         {"contact.friction": "0.1..0.2:3"},
-        {"periods": 3, "discard": 1, "start": ["cold", "follow-up"], "exponent": False},
-        ["--periods", "3", "--discard", "1", "--start", "cold,follow-up", "--no-exponent"],
+        {"periods": 3, "discard": 1, "start": ["cold", "follow-up"], "exponent": False, "phase": "90deg"},
+        ["--phase", "90deg", "--periods", "3", "--discard", "1", "--start", "cold,follow-up", "--no-exponent"],
     ),
 ]
 
@@ -216,6 +216,8 @@ def test_a_dataset_has_a_dimension_per_parameter_with_its_unit():
         ({"contact.clearance": 1e-4}, {}, "contact.clearance = 0.0001: expected a list of numbers or texts"),
         ({"contact.clearance": [1e-4]}, {"periods": 2.5}, "periods = 2.5: expected a whole number"),
         ({"contact.clearance": [1e-4]}, {"threads": 0}, "threads = 0: allowed whole numbers"),
+        ({"contact.clearance": [1e-4]}, {"phase": "90 mm"}, "phase = '90 mm': "),
+        ({"contact.clearance": [1e-4]}, {"phase": []}, "phase = ..: expected a fraction of the period, or text"),
     ],
 )
 def test_wrong_arguments_are_refused_in_sentences(vary, options, message):
