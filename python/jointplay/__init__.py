@@ -10,6 +10,7 @@ program `jointplay`: compare `Run.hash` with the state hash that `jointplay run`
 """
 
 from ._compare import Comparison, compare
+from ._control import Elements, Linearisation, Load, Motor, Spring
 from ._fit import FitStart, ParameterFit, fit
 from ._geometry import Shape
 from ._native import State, __version__
@@ -41,6 +42,7 @@ __all__ = [
     "Comparison",
     "DoubtWarning",
     "Effects",
+    "Elements",
     "Ends",
     "Estimate",
     "FitChoice",
@@ -51,6 +53,9 @@ __all__ = [
     "Indices",
     "InternalError",
     "JointplayError",
+    "Linearisation",
+    "Load",
+    "Motor",
     "OmissionWarning",
     "OptionError",
     "Parameter",
@@ -65,6 +70,7 @@ __all__ = [
     "Sensitivity",
     "Shape",
     "Simulation",
+    "Spring",
     "State",
     "Stopped",
     "Study",

@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import Any, Self
 
@@ -71,7 +71,7 @@ class Simulation:
     def __new__(cls, scene: Scene) -> Self: ...
     def step(self, count: int = 1) -> None:
         """Takes `count` steps, each as long as the method chooses."""
-    def run_until(self, time: float | str) -> None:
+    def step_until(self, time: float | str) -> None:
         """Steps to exactly `time`, s, at which the last step ends; does nothing if that has passed."""
     @property
     def time(self) -> float:
@@ -82,8 +82,29 @@ class Simulation:
     @property
     def state(self) -> State:
         """The whole state, to which `restore` returns with the same bits."""
-    def restore(self, state: State) -> None:
-        """Returns to a state of a simulation of the same scene."""
+    def restore(self, state: State) -> None: ...
+    def _elements(self) -> list[tuple[str, str, bool]]: ...
+    def _control(self, element: int, number: str, value: float) -> None: ...
+    def _controlled(self, element: int, number: str) -> float | None: ...
+    @property
+    def q(self) -> Mapping[str, Any]:
+        """Positions by name of coordinate: `crank.angle`, rad, `rail.position`, m; of a free body, under its name, the position of its
+        centre of mass, m, and its quaternion w, x, y, z. Read-only: `set_state` writes."""
+    @property
+    def v(self) -> Mapping[str, Any]:
+        """Velocities by the same names, m/s and rad/s; of a free body, those of its centre of mass and its angular velocity, world
+        axes."""
+    def set_state(self, q: Any = None, v: Any = None, time: float | str | None = None) -> None: ...
+    def mass_matrix(self) -> _Array:
+        """Mass matrix of the velocities, in the order of `vector`, SI: shape (velocities, velocities). Joints that close loops are left
+        out. Formulation `tree` only."""
+    def forces(self) -> _Array:
+        """Forces on the velocity coordinates, SI: loads, gravity, contacts and the terms of the velocities. Where no joint closes a loop
+        they equal `mass_matrix()` times the accelerations. Formulation `tree` only."""
+    def rhs(self, time: float, y: _Array | list[float]) -> _Array:
+        """d/dt of coordinates and velocities `y`, in the order of `vector`, at `time`, s. Contacts carry a force where they are closed,
+        and damp with the approach speeds of this state. Nothing changes."""
+    def _linearise(self) -> tuple[_Array, _Array]: ...
     def _change(self, key: str, value: float | int | str) -> str: ...
     def reset(self) -> None:
         """Restarts at t = 0 with all changes, including those that wait for a reset."""
@@ -94,7 +115,7 @@ class Simulation:
     def _instant(self) -> dict[str, Any]: ...
     @property
     def vector(self) -> _Array:
-        """Coordinates, then velocities, as the formulation orders them, SI."""
+        """Coordinates, then velocities, as the formulation orders them, SI; read-only."""
     def _take_impacts(self) -> _Impacts: ...
     @property
     def doubts(self) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from ._control import Elements, Linearisation, Load, Motor, Spring
 from ._geometry import matrices
 from ._link import frame_of
 from ._scene import impact_table
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
 
     from ._scene import Quantity, Scene
 
+    Numbers = float | Sequence[float] | NDArray[np.float64]
+    Positions = Mapping[str, Numbers] | Sequence[float] | NDArray[np.float64]
+
+E = TypeVar("E", Motor, Load, Spring)
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -96,7 +101,47 @@ class Simulation(_Guarded):
         self = super().__new__(cls, scene._native)
         self.scene = scene
         self._is_plain = True
+        self._elements_of: dict[type, Any] = {}
         return self
+
+    @property
+    def motors(self) -> Elements[Motor]:
+        """Motors by name: `motors["elbow"].torque = 3.0`."""
+        return self._by_name(Motor, "motor")
+
+    @property
+    def loads(self) -> Elements[Load]:
+        """Loads by name: `loads["wind"].force = (0, 0, -5)`."""
+        return self._by_name(Load, "load")
+
+    @property
+    def springs(self) -> Elements[Spring]:
+        """Springs between points and on joints by name: `springs["coil"].stiffness = 2e3`."""
+        return self._by_name(Spring, "spring", "joint_spring")
+
+    def _by_name(self, kind: type[E], *kinds: str) -> Elements[E]:
+        own: Elements[E] | None = self._elements_of.get(kind)
+        if own is None:
+            own = self._elements_of[kind] = Elements(self, kind, *kinds)
+            self._is_plain = False
+        return own
+
+    def set_state(self, q: Positions | None = None, v: Positions | None = None, time: Quantity | None = None) -> None:
+        """Starts again at positions `q` and velocities `v`, by name of coordinate or all in the order of `vector`.
+
+        What is not given stays, as does the time. Loops are closed, contacts are found anew, counters and ledger begin again.
+        """
+        super().set_state(q, v, time)
+        self._is_plain = False
+
+    def linearise(self) -> Linearisation:
+        """The motion linearised about this state by central differences: small motions about a state at rest."""
+        return Linearisation(*self._linearise())
+
+    def reset(self) -> None:
+        """Restarts at t = 0 with all changes of parameters, including those that wait for a reset."""
+        super().reset()
+        self._elements_of.clear()
 
     def set(self, key: str, value: Quantity) -> str:
         """Changes a parameter of the running machine: SI, or text with a unit.
@@ -108,8 +153,12 @@ class Simulation(_Guarded):
         return effect
 
     def restore(self, state: _native.State) -> None:
-        """Returns to a state of a simulation of the same scene."""
+        """Returns to a state of a simulation of the same scene, with the same bits.
+
+        From a state of another scene with the same coordinates, such as one with other parameters, it starts at their values and time.
+        """
         super().restore(state)
+        self._elements_of.clear()
         # The state may contain changes.
         self._is_plain = False
 

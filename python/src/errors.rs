@@ -50,7 +50,8 @@ pub fn set_error(py: Python<'_>, scene: &Scene, error: &SetError) -> PyErr {
     }
 }
 
-fn change_error(py: Python<'_>, error: &ChangeError) -> PyErr {
+/// A change that a running simulation refuses.
+pub fn change_error(py: Python<'_>, error: &ChangeError) -> PyErr {
     option_error(py, &error.to_string())
 }
 

@@ -4,6 +4,7 @@
 //! Work runs without the interpreter's lock and checks for Ctrl-C between steps (`interpreter`). Errors become the exceptions of
 //! `jointplay.errors`.
 
+mod control;
 mod errors;
 mod geometry;
 mod interpreter;

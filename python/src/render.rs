@@ -32,6 +32,7 @@ pub fn render<'py>(
             return Err(option_error(py, &format!("{name} = {value}: allowed 1 to {MAX_EDGE} pixels")));
         }
     }
+    simulation.sample(py)?;
     let picture = detached(py, || {
         let mut list = DrawList::default();
         draw(simulation, [width, height], &mut list);
@@ -48,8 +49,8 @@ pub fn render<'py>(
     Ok(PyArray3::from_owned_array(py, pixels.map_err(|error| option_error(py, &error.to_string()))?))
 }
 
-/// Builds the draw list of the current instant of `simulation`.
-fn draw(simulation: &mut PySimulation, size: [u32; 2], list: &mut DrawList) {
+/// Builds the draw list of the instant of `simulation` last sampled.
+fn draw(simulation: &PySimulation, size: [u32; 2], list: &mut DrawList) {
     let (scene, [start, frame]) = simulation.running_and_frames();
     let view = SceneView::new(scene, start);
     // A simulation records no path and no peaks.

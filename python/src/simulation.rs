@@ -4,15 +4,16 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use jointplay_physics::machine::{Mat3, Vec3};
-use jointplay_physics::simulate::{ChannelInfo, Effect, Frame, Stopped, matching};
+use jointplay_physics::simulate::{ChannelInfo, Coordinate, Effect, Frame, Stopped, matching};
 use jointplay_scene::{LiveScene, SavedState, Scene, SceneError, SceneSnapshot};
 use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyType};
+use pyo3::types::{PyDict, PyMappingProxy, PyType};
 
 use crate::WRITER;
-use crate::errors::{exception, option_error, scene_error, set_error, stopped};
+use crate::control::{self, Control};
+use crate::errors::{change_error, exception, option_error, scene_error, set_error, stopped};
 use crate::interpreter::{STEPS_BETWEEN_CHECKS, detached, guarded};
 use crate::quantity::{duration, to_text};
 use crate::report;
@@ -119,9 +120,23 @@ pub struct PySimulation {
     live: LiveScene,
     layout: Arc<Layout>,
     frame: Frame,
+    /// Coordinates of the state vector.
+    coordinates: Arc<[Coordinate]>,
+    /// What was set of force elements since the latest step, which acts together with the next call that needs it.
+    controls: Vec<Control>,
 }
 
 impl PySimulation {
+    /// The run, after what was set of its elements.
+    pub(super) fn run(&mut self, py: Python<'_>) -> PyResult<&mut LiveScene> {
+        if !self.controls.is_empty() {
+            let outcome = guarded(py, || self.live.control(&self.controls))?;
+            self.controls.clear();
+            outcome.map_err(|error| change_error(py, &error))?;
+        }
+        Ok(&mut self.live)
+    }
+
     /// Takes steps until `is_over`; checks for Ctrl-C between them.
     fn advance(
         &mut self,
@@ -130,7 +145,7 @@ impl PySimulation {
         mut is_over: impl FnMut(&LiveScene) -> bool + Send,
     ) -> PyResult<()> {
         loop {
-            let live = &mut self.live;
+            let live = self.run(py)?;
             let outcome = detached(py, || {
                 for _ in 0..STEPS_BETWEEN_CHECKS {
                     if is_over(live) {
@@ -147,17 +162,25 @@ impl PySimulation {
         }
     }
 
-    /// The scene in effect, its first instant, and this one.
+    /// The scene in effect, its first instant, and the one last sampled.
     #[cfg(feature = "render")]
-    pub fn running_and_frames(&mut self) -> (&Scene, [&Frame; 2]) {
-        self.sample();
+    pub fn running_and_frames(&self) -> (&Scene, [&Frame; 2]) {
         (self.live.running(), [&self.layout.start, &self.frame])
     }
 
     /// Samples this instant with all channels.
-    fn sample(&mut self) {
+    pub(super) fn sample(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.run(py)?;
         self.layout.channels.iter().for_each(|channel| channel.reading().request(&mut self.frame));
-        self.live.sample_now(&mut self.frame);
+        guarded(py, || self.live.sample_now(&mut self.frame))
+    }
+
+    /// Lays out the run anew, which has just started.
+    fn lay_out(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.layout = Arc::new(detached(py, || Layout::of(&mut self.live))?);
+        self.coordinates = self.live.coordinates().into();
+        self.controls.clear();
+        Ok(())
     }
 }
 
@@ -167,7 +190,9 @@ impl PySimulation {
     fn new(py: Python<'_>, scene: &PyScene) -> PyResult<Self> {
         let mut live = scene.start(py)?;
         let layout = Arc::new(detached(py, || Layout::of(&mut live))?);
-        Ok(Self { scene: scene.scene.clone(), live, layout, frame: Frame::default() })
+        let coordinates = live.coordinates().into();
+        let scene = scene.scene.clone();
+        Ok(Self { scene, live, layout, frame: Frame::default(), coordinates, controls: Vec::new() })
     }
 
     /// Takes `count` steps, each as long as the method chooses.
@@ -183,7 +208,7 @@ impl PySimulation {
     }
 
     /// Steps to exactly `time`, at which the last step ends.
-    fn run_until(&mut self, py: Python<'_>, time: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn step_until(&mut self, py: Python<'_>, time: &Bound<'_, PyAny>) -> PyResult<()> {
         let end = duration("time", time)?;
         self.advance(py, |live| live.step_until(end), |live| live.time() >= end)
     }
@@ -202,20 +227,102 @@ impl PySimulation {
 
     /// The whole state.
     #[getter]
-    fn state(&self) -> PyState {
-        PyState { scene: self.scene.clone(), snapshot: self.live.snapshot(), layout: self.layout.clone() }
+    fn state(&mut self, py: Python<'_>) -> PyResult<PyState> {
+        let snapshot = self.run(py)?.snapshot();
+        Ok(PyState { scene: self.scene.clone(), snapshot, layout: self.layout.clone() })
     }
 
-    /// Returns to a state of this scene.
+    /// Returns to a state of this scene, or starts at its coordinates and time from one of a scene with the same coordinates.
     fn restore(&mut self, py: Python<'_>, state: &PyState) -> PyResult<()> {
-        if !Arc::ptr_eq(&state.scene, &self.scene) && state.scene != self.scene {
+        if Arc::ptr_eq(&state.scene, &self.scene) || state.scene == self.scene {
+            self.live.restore(&state.snapshot);
+            self.layout = state.layout.clone();
+            self.coordinates = self.live.coordinates().into();
+            self.controls.clear();
+            return Ok(());
+        }
+        let machine = &state.snapshot.running().machine;
+        let other = self.live.mechanism().coordinate_names(machine);
+        let same = machine.bodies.len() == self.live.machine().bodies.len() && *other == *self.coordinates;
+        if !same || state.snapshot.vector().len() != self.live.state_vector().len() {
             let (own, other) = (&self.scene.name, &state.scene.name);
-            let message = format!("state: one of the scene `{other}`, but this simulation runs `{own}`");
+            let message = format!("state: one of the scene `{other}`, whose coordinates differ from those of `{own}`");
             return Err(option_error(py, &message));
         }
-        self.live.restore(&state.snapshot);
-        self.layout = state.layout.clone();
+        control::restart(py, self.run(py)?, state.snapshot.time(), state.snapshot.vector())
+    }
+
+    /// Force elements by index: name, kind in a scene file, and whether it acts on an angle.
+    fn _elements(&self) -> Vec<(&str, &'static str, bool)> {
+        control::elements(self.live.machine())
+    }
+
+    /// Sets a number of a force element, which acts from this instant on.
+    fn _control(&mut self, py: Python<'_>, element: usize, number: &str, value: f64) -> PyResult<()> {
+        let control = control::checked(py, &self.live, (element, number, value))?;
+        self.controls.push(control);
         Ok(())
+    }
+
+    /// A number of a force element, SI; `None` if it does not have it.
+    fn _controlled(&mut self, py: Python<'_>, element: usize, number: &str) -> PyResult<Option<f64>> {
+        let run = self.run(py)?;
+        Ok(control::number(number).and_then(|number| run.controlled(element, number)))
+    }
+
+    /// Positions by name of coordinate.
+    #[getter]
+    fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        control::by_name(py, &self.coordinates, self.live.state_vector(), |own| own.positions.clone())
+    }
+
+    /// Velocities by name of coordinate.
+    #[getter]
+    fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let positions = self.live.mechanism().positions();
+        let velocities = &self.live.state_vector()[positions..];
+        control::by_name(py, &self.coordinates, velocities, |own| own.velocities.clone())
+    }
+
+    /// Starts again at given positions and velocities; those not given stay.
+    #[pyo3(signature = (q=None, v=None, time=None))]
+    fn set_state(
+        &mut self,
+        py: Python<'_>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+        time: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let time = time.map(|time| duration("time", time)).transpose()?.unwrap_or(self.live.time());
+        let mut y = self.live.state_vector().to_vec();
+        let (positions, velocities) = y.split_at_mut(self.live.mechanism().positions());
+        let coordinates = &self.coordinates;
+        control::take(("q", q), coordinates, positions, |own| own.positions.clone())?;
+        control::take(("v", v), coordinates, velocities, |own| own.velocities.clone())?;
+        control::restart(py, self.run(py)?, time, &y)
+    }
+
+    /// Mass matrix of the velocities.
+    fn mass_matrix<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let mass = control::answer(py, self.run(py)?.mass_matrix())?;
+        Ok(control::matrix(py, mass.shape(), |at| mass[at]))
+    }
+
+    /// Forces on the velocity coordinates.
+    fn forces<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let forces = control::answer(py, self.run(py)?.generalised_forces())?;
+        Ok(PyArray1::from_slice(py, forces.as_slice()))
+    }
+
+    /// d/dt of the state vector at any time and state vector.
+    fn rhs<'py>(&mut self, py: Python<'py>, time: f64, y: Vec<f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_vec(py, control::answer(py, self.run(py)?.rhs(time, &y))?))
+    }
+
+    /// Matrix and directions of the motion linearised about this state.
+    fn _linearise<'py>(&mut self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 2]> {
+        let found = control::answer(py, self.run(py)?.linearise())?;
+        Ok([&found.matrix, &found.directions].map(|of| control::matrix(py, of.shape(), |at| of[at])))
     }
 
     /// Changes a parameter; returns whether it takes effect `now` or `at reset`.
@@ -226,7 +333,8 @@ impl PySimulation {
         let Some(text) = to_text(parameter, key, value)? else {
             return Err(option_error(py, &format!("{key} = None: a running simulation needs a value")));
         };
-        let effect = detached(py, || self.live.set(key, &text))?.map_err(|error| set_error(py, &pending, &error))?;
+        let live = self.run(py)?;
+        let effect = detached(py, || live.set(key, &text))?.map_err(|error| set_error(py, &pending, &error))?;
         Ok(match effect {
             Effect::Now => "now",
             Effect::AtReset => "at reset",
@@ -238,8 +346,7 @@ impl PySimulation {
         let outcome = detached(py, || self.live.reset())?;
         let pending = self.live.pending();
         outcome.map_err(|error| scene_error(py, Some(pending), &pending.locate(&error)))?;
-        self.layout = Arc::new(detached(py, || Layout::of(&mut self.live))?);
-        Ok(())
+        self.lay_out(py)
     }
 
     /// Names of the channels, in the order of [`Self::frame`].
@@ -262,37 +369,39 @@ impl PySimulation {
             };
             return Err(exception(py, "ChannelError", &message, None));
         };
-        guarded(py, || self.sample())?;
+        self.sample(py)?;
         Ok(self.layout.channels[index].reading().read(&self.frame).unwrap_or(f64::NAN))
     }
 
     /// All channels and vectors of this instant.
     #[pyo3(name = "_instant")]
     fn instant<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        guarded(py, || self.sample())?;
+        self.sample(py)?;
         let frame = &self.frame;
         let all = PyDict::new(py);
         all.set_item("time", frame.time)?;
         let values = self.layout.channels.iter().map(|channel| channel.reading().read(frame).unwrap_or(f64::NAN));
-        all.set_item("values", PyArray1::from_owned_array(py, Array1::from_iter(values)))?;
+        all.set_item("values", control::read_only(PyArray1::from_owned_array(py, Array1::from_iter(values))))?;
         all.set_item("positions", vectors(py, frame.bodies.iter().map(|body| body.position)))?;
         all.set_item("velocities", vectors(py, frame.bodies.iter().map(|body| body.velocity)))?;
         all.set_item("angular_velocities", vectors(py, frame.bodies.iter().map(|body| body.angular_velocity)))?;
         let rotations: Vec<Mat3> = frame.bodies.iter().map(|body| body.rotation).collect();
         let rotations = Array3::from_shape_fn((rotations.len(), 3, 3), |(b, i, j)| rotations[b][(i, j)]);
-        all.set_item("rotations", PyArray3::from_owned_array(py, rotations))?;
+        all.set_item("rotations", control::read_only(PyArray3::from_owned_array(py, rotations)))?;
         all.set_item("eccentricities", vectors(py, frame.joints.iter().map(|joint| joint.eccentricity)))?;
         all.set_item("normal_forces", vectors(py, frame.joints.iter().map(|joint| joint.normal_force)))?;
         all.set_item("friction_forces", vectors(py, frame.joints.iter().map(|joint| joint.friction_force)))?;
-        all.set_item("axial", PyArray1::from_iter(py, frame.joints.iter().map(|joint| joint.axial)))?;
-        all.set_item("tilts", PyArray1::from_iter(py, frame.joints.iter().map(|joint| joint.tilt)))?;
+        let axial = PyArray1::from_iter(py, frame.joints.iter().map(|joint| joint.axial));
+        all.set_item("axial", control::read_only(axial))?;
+        let tilts = PyArray1::from_iter(py, frame.joints.iter().map(|joint| joint.tilt));
+        all.set_item("tilts", control::read_only(tilts))?;
         Ok(all)
     }
 
     /// State vector: coordinates, then velocities, as the formulation orders them, SI.
     #[getter]
     fn vector<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, self.live.state_vector())
+        control::read_only(PyArray1::from_slice(py, self.live.state_vector()))
     }
 
     /// Impacts finished since the last call.
@@ -305,14 +414,14 @@ impl PySimulation {
 
     /// Reasons to doubt the results so far.
     #[getter]
-    fn doubts(&self) -> Vec<String> {
-        report::doubts(&self.live)
+    fn doubts(&mut self, py: Python<'_>) -> PyResult<Vec<String>> {
+        Ok(report::doubts(self.run(py)?))
     }
 
     /// Energy exchanged so far, J.
     #[getter]
-    fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        report::ledger(py, &self.live)
+    fn ledger<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        report::ledger(py, self.run(py)?)
     }
 
     /// Counters so far.
@@ -325,5 +434,5 @@ impl PySimulation {
 /// An array with one row per vector.
 fn vectors(py: Python<'_>, vectors: impl Iterator<Item = Vec3>) -> Bound<'_, PyArray2<f64>> {
     let all: Vec<Vec3> = vectors.collect();
-    PyArray2::from_owned_array(py, Array2::from_shape_fn((all.len(), 3), |(row, i)| all[row][i]))
+    control::read_only(PyArray2::from_owned_array(py, Array2::from_shape_fn((all.len(), 3), |(row, i)| all[row][i])))
 }

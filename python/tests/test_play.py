@@ -65,7 +65,7 @@ def test_channels_of_an_end_and_frames_agree():
     assert np.allclose(run["J.a.normal"] + run["J.b.normal"], run["J.normal"], rtol=1e-9, atol=1e-9)
     assert np.allclose(run["J.gap"], np.minimum(run["J.a.gap"], run["J.b.gap"]))
     simulation = jp.Simulation(scene)
-    simulation.run_until("0.53 ms")
+    simulation.step_until("0.53 ms")
     frame = simulation.frame()
     assert frame.tilts.shape == frame.axial.shape == (1,)
     assert abs(frame.tilts[0] - simulation["J.tilt"]) < 1e-15 and abs(frame.axial[0]) < 1e-12
@@ -84,7 +84,7 @@ def test_plays_are_parameters_that_a_run_changes():
     assert simulation.set("joint.J.play.radial", "0.2 mm") == "now"
     assert simulation.set("joint.J.play.length", 0.03) == "at reset"
     # In flight the gap widens at once; the pin flies on and has farther to go.
-    simulation.run_until("10 ms")
+    simulation.step_until("10 ms")
     impacts = simulation.take_impacts()
     assert np.isclose(impacts["start_s"].min(), 2 * PLAY / SPEED, rtol=1e-9)
     # All of them are there, though two at a time peak in turns.

@@ -44,7 +44,7 @@ def test_a_picture_is_that_of_the_program(program, tmp_path):
     (path,) = (tmp_path / "frames").glob("*.png")
     expected = pixels(path)
     simulation = jp.Simulation(jp.Scene.load("pendulum"))
-    simulation.run_until("20 ms")
+    simulation.step_until("20 ms")
     picture = jp.render(simulation, (160, 90))
     assert picture.shape == (90, 160, 4) and picture.dtype == np.uint8 and (picture[..., 3] == 255).all()
     assert np.abs(picture[..., :3].astype(int) - expected[..., :3].astype(int)).max() <= 2

@@ -195,7 +195,7 @@ def test_a_scene_moves_as_in_mujoco():
     mujoco.mj_kinematics(model, data)
     scene = imported(text)
     simulation = jp.Simulation(scene.set(tolerance=1e-9))
-    simulation.run_until(0.5)
+    simulation.step_until(0.5)
     frame = simulation.frame()
     for k, name in enumerate(scene.bodies):
         if name in ("upper", "lower", "end", "buoy"):

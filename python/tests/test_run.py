@@ -169,7 +169,7 @@ def test_poses_are_those_of_the_simulation():
     scene = jp.Scene.load("spcmm").set(clearance="0.5 mm")
     run = scene.run("10 ms", every="5 ms", channels=["*.pose.*"], warn=False)
     simulation = jp.Simulation(scene)
-    simulation.run_until("10 ms")
+    simulation.step_until("10 ms")
     poses = simulation.frame().transforms
     assert run.transforms.shape == (3, len(scene.bodies), 4, 4)
     assert np.allclose(run.transforms[-1], poses, rtol=0.0, atol=1e-14) and (poses[:, 3] == [0.0, 0.0, 0.0, 1.0]).all()

@@ -250,7 +250,7 @@ def test_a_link_opens_the_same_scene_in_the_program(falling, summary):
 def test_runs_and_simulations_show_the_page_at_their_end(monkeypatch):
     scene = jp.Scene.load("four-bar")
     run, simulation = scene.run("2 ms"), jp.Simulation(scene)
-    simulation.run_until("1 ms")
+    simulation.step_until("1 ms")
     monkeypatch.delenv("JOINTPLAY_PAGE", raising=False)
     assert "iframe" not in run._repr_html_() + simulation._repr_html_()
     monkeypatch.setenv("JOINTPLAY_PAGE", "https://example.org/")

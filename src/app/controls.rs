@@ -599,7 +599,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
         ui.label(RichText::new(format!("Key {key}")).small().weak());
         if parameter.at_reset {
             let when = if parameter.scope == Scope::Own {
-                "Applies at the next restart; at once where only contacts and gravity depend on it"
+                "Applies at the next restart; at once where only contacts, gravity, springs, loads or motors depend on it"
             } else {
                 "Applies at the next restart"
             };

@@ -1,9 +1,9 @@
-//! The ideal motion beside the run: the same scene with every ball joint closed, under the same drives and gravity. It is
+//! The ideal motion beside the run: the same scene with every ball joint closed, under the same drives and applied forces. It is
 //! computed only while shown, up to the displayed instant, and does not affect the run.
 
 use super::clock::Clock;
 use super::companion::Companion;
-use crate::machine::{Machine, Output, Vec3};
+use crate::machine::{AppliedForces, Machine, Output, Vec3};
 use crate::simulate::{Frame, Simulation, StartError, closed};
 
 /// The ideal motion follows the recording if it is less than this behind, s, in at most this many steps.
@@ -19,41 +19,41 @@ pub fn output_point(output: &Output, frame: &Frame) -> Option<Vec3> {
     Some(body.position + arm)
 }
 
-/// Gravity of a run over time. The ideal motion applies the same changes.
+/// Gravity and force elements of a run over time. The ideal motion applies the same changes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Gravity {
-    /// Start time, s, and value, m/s^2, in order.
-    changes: Vec<(f64, Vec3)>,
+pub struct AppliedHistory {
+    /// Start time, s, and what acts from then on, in order.
+    changes: Vec<(f64, AppliedForces)>,
 }
 
-impl Gravity {
+impl AppliedHistory {
     /// Constant from the start.
-    pub fn new(gravity: Vec3) -> Self {
-        Self { changes: vec![(f64::NEG_INFINITY, gravity)] }
+    pub fn new(forces: AppliedForces) -> Self {
+        Self { changes: vec![(f64::NEG_INFINITY, forces)] }
     }
 
-    /// Records that `gravity` acted in a step of the run from `start`, s. Later entries belong to an abandoned future and are
+    /// Records that `forces` acted in a step of the run from `start`, s. Later entries belong to an abandoned future and are
     /// dropped.
-    /// Returns whether any were dropped or gravity changed.
-    pub fn observe(&mut self, start: f64, gravity: Vec3) -> bool {
+    /// Returns whether any were dropped or the forces changed.
+    pub fn observe(&mut self, start: f64, forces: AppliedForces) -> bool {
         let retained = self.changes.partition_point(|(time, _)| *time <= start);
         let has_dropped = retained < self.changes.len();
         self.changes.truncate(retained.max(1));
         let last = self.changes.len() - 1;
-        if self.changes[last].1 == gravity {
+        if self.changes[last].1 == forces {
             return has_dropped;
         }
         if self.changes[last].0 == start {
-            self.changes[last].1 = gravity;
+            self.changes[last].1 = forces;
         } else {
-            self.changes.push((start, gravity));
+            self.changes.push((start, forces));
         }
         true
     }
 
-    fn at(&self, time: f64) -> Vec3 {
+    fn at(&self, time: f64) -> &AppliedForces {
         let known = self.changes.partition_point(|(since, _)| *since <= time);
-        self.changes[known.max(1) - 1].1
+        &self.changes[known.max(1) - 1].1
     }
 
     /// Time of the next change after `time`, s.
@@ -78,10 +78,10 @@ impl Ideal {
     }
 
     /// Advances to `time`, s, up to which the run is recorded, if the motion lags by less than `FOLLOW_LAG`.
-    pub fn follow(&mut self, time: f64, gravity: &Gravity) {
+    pub fn follow(&mut self, time: f64, forces: &AppliedHistory) {
         if self.motion.as_ref().is_ok_and(|motion| time - motion.simulation.time() < FOLLOW_LAG) {
             let mut left = FOLLOW_STEPS;
-            self.move_to(time, gravity, || {
+            self.move_to(time, forces, || {
                 left = left.saturating_sub(1);
                 left > 0
             });
@@ -89,15 +89,15 @@ impl Ideal {
     }
 
     /// Advances to `time`, s, within the budget of a frame.
-    pub fn catch_up(&mut self, time: f64, gravity: &Gravity, clock: Clock) {
+    pub fn catch_up(&mut self, time: f64, forces: &AppliedHistory, clock: Clock) {
         if self.frame(time).is_none() {
             let start = clock();
-            self.move_to(time, gravity, || clock() - start < FRAME_BUDGET);
+            self.move_to(time, forces, || clock() - start < FRAME_BUDGET);
         }
     }
 
     /// Samples the state at `time`, s, if `may_step` allows the steps needed.
-    fn move_to(&mut self, time: f64, gravity: &Gravity, mut may_step: impl FnMut() -> bool) {
+    fn move_to(&mut self, time: f64, forces: &AppliedHistory, mut may_step: impl FnMut() -> bool) {
         let Ok(motion) = &mut self.motion else {
             return;
         };
@@ -108,10 +108,11 @@ impl Ideal {
             may_step().then(|| {
                 motion.save_state();
                 let now = motion.simulation.time();
-                if motion.simulation.conditions().gravity != gravity.at(now) {
-                    motion.simulation.set_gravity(gravity.at(now));
+                if motion.simulation.state().applied_forces() != *forces.at(now) {
+                    let changed = motion.simulation.set_applied_forces(forces.at(now));
+                    changed.expect("an explicit method takes any forces");
                 }
-                gravity.next(now)
+                forces.next(now)
             })
         });
         if is_reached {
@@ -119,7 +120,7 @@ impl Ideal {
         }
     }
 
-    /// Drops states after `time`, s, where gravity changed or the run branched.
+    /// Drops states after `time`, s, where applied forces changed or the run branched.
     pub(crate) fn forget_after(&mut self, time: f64) {
         if let Ok(motion) = &mut self.motion {
             motion.forget_after(time);
@@ -288,9 +289,9 @@ mod tests {
         while other.time() < change {
             other.step_until(change).expect("runs");
         }
-        let mut weightless = scene.machine.gravity;
-        weightless.z = 0.0;
-        other.set_gravity(weightless);
+        let mut weightless = AppliedForces::of(&scene.machine);
+        weightless.gravity.z = 0.0;
+        other.set_applied_forces(&weightless).expect("no element changes");
         other.advance_to(time).expect("runs");
         other.sample(time, &mut frame);
         let expected = output_point(&scene.machine.output, &frame).expect("has a body");
@@ -316,7 +317,7 @@ mod tests {
         while uninterrupted.time() < change {
             uninterrupted.step_until(change).expect("runs");
         }
-        uninterrupted.set_gravity(weightless);
+        uninterrupted.set_applied_forces(&weightless).expect("no element changes");
         uninterrupted.advance_to(time).expect("runs");
         uninterrupted.sample(time, &mut frame);
         let expected = output_point(&scene.machine.output, &frame).expect("has a body");
@@ -327,9 +328,9 @@ mod tests {
     fn the_number_of_saved_states_is_bounded_and_every_instant_stays_reachable() {
         let scene = scene("pendulum", &[]);
         let mut ideal = Ideal::new(&scene.machine);
-        let gravity = Gravity::new(scene.machine.gravity);
+        let forces = AppliedHistory::new(AppliedForces::of(&scene.machine));
         let at = |ideal: &mut Ideal, time: f64| {
-            ideal.move_to(time, &gravity, || true);
+            ideal.move_to(time, &forces, || true);
             assert!(ideal.motion.as_ref().expect("starts").states.len() <= MAX_STATES);
             output_point(&scene.machine.output, ideal.frame(time).expect("reached")).expect("a body")
         };
@@ -364,19 +365,19 @@ mod tests {
     }
 
     #[test]
-    fn gravity_follows_the_branch_that_the_run_took() {
-        let g = |z: f64| Vec3::new(0.0, 0.0, z);
-        let mut gravity = Gravity::new(g(-9.81));
-        assert!(!gravity.observe(0.0, g(-9.81)));
-        assert!(gravity.observe(1.0, g(-5.0)));
-        assert!(!gravity.observe(1.5, g(-5.0)));
-        assert!(gravity.observe(2.0, g(0.0)));
-        assert_eq!(gravity.at(0.5), g(-9.81));
-        assert_eq!((gravity.at(1.0), gravity.next(1.0)), (g(-5.0), 2.0));
+    fn applied_forces_follow_the_branch_that_the_run_took() {
+        let g = |z: f64| AppliedForces { gravity: Vec3::new(0.0, 0.0, z), ..AppliedForces::of(&Machine::default()) };
+        let mut forces = AppliedHistory::new(g(-9.81));
+        assert!(!forces.observe(0.0, g(-9.81)));
+        assert!(forces.observe(1.0, g(-5.0)));
+        assert!(!forces.observe(1.5, g(-5.0)));
+        assert!(forces.observe(2.0, g(0.0)));
+        assert_eq!(*forces.at(0.5), g(-9.81));
+        assert_eq!((forces.at(1.0), forces.next(1.0)), (&g(-5.0), 2.0));
         // Back to 0.9 s: later entries are gone.
-        assert!(gravity.observe(0.9, g(-9.81)));
-        assert_eq!((gravity.at(3.0), gravity.next(0.0)), (g(-9.81), f64::INFINITY));
-        assert!(gravity.observe(1.2, g(1.0)) && gravity.observe(1.2, g(2.0)));
-        assert_eq!(gravity.at(1.2), g(2.0));
+        assert!(forces.observe(0.9, g(-9.81)));
+        assert_eq!((forces.at(3.0), forces.next(0.0)), (&g(-9.81), f64::INFINITY));
+        assert!(forces.observe(1.2, g(1.0)) && forces.observe(1.2, g(2.0)));
+        assert_eq!(*forces.at(1.2), g(2.0));
     }
 }

@@ -13,13 +13,14 @@ use super::advice::{self, Advice};
 use super::clock::{Clock, wall};
 use super::goal::Goal;
 use super::history::History;
-use super::ideal::{Gravity, Ideal};
+use super::ideal::{AppliedHistory, Ideal};
 use super::log::{Entry, Event, Log, Script};
 use super::pace::{Limit, Pacer};
 use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::RunWatch;
+use crate::machine::AppliedForces;
 use crate::scene::{LiveScene, Scene, SetError, Value};
 use crate::simulate::{
     ChannelInfo, Channels, ContactMode, Effect, Frame, Peak, Pull, Simulation, StartError, Stopped, Wear,
@@ -70,8 +71,8 @@ pub struct Player {
     edits: Vec<Edit>,
     before_change: BeforeChange,
     twin: Option<Box<Twin>>,
-    /// Gravity since the start, for the ideal motion.
-    gravity: Gravity,
+    /// Gravity and force elements since the start, for the ideal motion.
+    forces: AppliedHistory,
     /// The ideal motion, while it is shown or its distance from the run is recorded.
     ideal: Option<Box<Ideal>>,
     shows_ideal: bool,
@@ -149,7 +150,7 @@ impl Player {
             edits: Vec::new(),
             before_change: BeforeChange::default(),
             twin: None,
-            gravity: Gravity::new(scene.machine.gravity),
+            forces: AppliedHistory::new(AppliedForces::of(&scene.machine)),
             ideal: None,
             shows_ideal: false,
             records_tip_error: false,
@@ -271,7 +272,7 @@ impl Player {
         if let Some(ideal) = &mut self.ideal {
             // The record has sampled it at its end, unless it lags behind.
             let time = if self.shows_ideal { self.pacer.shown() } else { self.record.recorded_to };
-            ideal.catch_up(time, &self.gravity, self.clock);
+            ideal.catch_up(time, &self.forces, self.clock);
         }
     }
 
@@ -660,8 +661,8 @@ impl Player {
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
-                let (start, gravity) = (self.simulation.step_start(), self.simulation.running().machine.gravity);
-                if self.gravity.observe(start, gravity)
+                let (start, forces) = (self.simulation.step_start(), self.simulation.state().applied_forces());
+                if self.forces.observe(start, forces)
                     && let Some(ideal) = &mut self.ideal
                 {
                     ideal.forget_after(start);
@@ -729,7 +730,7 @@ impl Player {
         }
         self.record.recorded_to = time;
         if let Some(ideal) = &mut self.ideal {
-            ideal.follow(time, &self.gravity);
+            ideal.follow(time, &self.forces);
             let error = ideal.output_error(&frame).map_or(f64::NAN, |e| e.norm());
             self.record.values[self.record.channels.tip_error()] = error;
         }

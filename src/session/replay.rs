@@ -187,6 +187,21 @@ mod tests {
     }
 
     #[test]
+    fn live_changes_of_force_elements_are_reproduced_bit_by_bit() {
+        let mut original = player("suspension");
+        original.run_to(20e-3);
+        for (key, value) in [("spring.coil.stiffness", "200 kN/m"), ("spring.damper.damping", "10 kN s/m")] {
+            let effect = original.set(key, value).expect("in range");
+            assert_eq!(effect, crate::simulate::Effect::Now, "{key}");
+            original.run_to(original.simulation().time() + 10e-3);
+        }
+        // The ground would jump to another phase.
+        assert_eq!(original.set("parameter.rate", "3 Hz").expect("in range"), crate::simulate::Effect::AtReset);
+        assert!(original.simulation().ledger().expect("on").change_work != 0.0);
+        assert_reproduced(&original);
+    }
+
+    #[test]
     fn changes_before_a_reset_apply_from_the_start_of_the_next_run() {
         let mut original = player("spcmm");
         original.run_to(5e-3);

@@ -250,7 +250,7 @@ fn bad_elements_are_refused_with_their_position() {
         [[spring]]; name = "s"; from = { body = "world" }; to = { body = "mass" }; length = "1 m"; stiffness = "-1 N/m" -> -1 N/m | allowed 0 N/m to
         [[spring]]; name = "s"; from = { body = "world" }; to = { body = "mass" }; length = "1 m"; stifness = "1 N/m" -> stifness | stiffness
         [[load]]; name = "f"; on = { body = "world" }; force = "1 0 0 N" -> load.f.on | not on the world
-        [[load]]; name = "f"; on = { body = "mass" }; frequency = "2 Hz" -> load.f | does nothing: force, torque are 0
+        [[load]]; name = "f"; on = { body = "mass" }; frequency = "2 Hz" -> load.f | does nothing: force, torque are missing
         [[load]]; name = "free"; on = { body = "mass" }; force = "1 0 0 N" -> load.free.name | already a joint or force element
         [[load]]; name = "f"; on = { body = "mass" }; axes = "bodies" -> axes | world, body
     "#;

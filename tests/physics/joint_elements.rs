@@ -527,7 +527,7 @@ fn bad_elements_on_joints_are_refused_with_their_position() {
         [[stop]]; name = "s"; joint = "slide"; force = "1 N"; depth = "1 mm"; upper = 0; restitution = 0 -> stop.s.restitution | allowed 0.01 to 1
         [[stop]]; name = "s"; joint = "slide"; force = "1 N"; depth = 0; upper = 0 -> stop.s.depth | allowed 1e-9 m to 1000 m
         [[motor]]; name = "m"; joint = "crank"; torque = "1 N m" -> motor.m.joint | has a drive
-        [[motor]]; name = "m"; joint = "elbow"; limit = "1 N m" -> motor.m | does nothing: torque, stiffness, damping
+        [[motor]]; name = "m"; joint = "elbow"; limit = "1 N m" -> motor.m | does nothing: torque, stiffness, damping are missing
         [[motor]]; name = "m"; joint = "elbow"; stiffness = "1 N m/rad" -> motor.m.target | missing
         [[motor]]; name = "m"; joint = "elbow"; torque = "1 N m"; target = { law = "constant", velocity = 0 } -> motor.m.target | has no effect
         [[motor]]; name = "m"; joint = "elbow"; stiffness = "1 N m/rad"; target = { law = "constant", velocity = "1 m/s" } -> motor.m.target.velocity | rad/s

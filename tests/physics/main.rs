@@ -17,6 +17,7 @@ fn trial(name: &str) -> String {
 mod bushings;
 mod channels;
 mod closed_form;
+mod control;
 mod coordinates;
 mod corners;
 mod discrete_gradient;

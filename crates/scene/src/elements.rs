@@ -412,6 +412,17 @@ impl ElementReader<'_, '_> {
         Err(self.section.error("", format!("this {kind} does nothing: {keys} {zero}")))
     }
 
+    /// Rejects an element for which none of `keys` is written. Each may be 0: a controller sets them while the machine runs.
+    fn check_given(&self, keys: &[&str]) -> Result<(), SceneError> {
+        if keys.iter().any(|key| self.section.get(key).is_some()) {
+            return Ok(());
+        }
+        let (kind, keys) = (self.section.rows.name, keys.join(", "));
+        Err(self
+            .section
+            .error("", format!("this {kind} does nothing: {keys} are missing; one must be given, if only as 0")))
+    }
+
     /// An error about a key that may be absent.
     fn fault<T>(&self, name: &str, why: &str) -> Result<T, SceneError> {
         Err(match self.section.get(name) {
@@ -468,9 +479,14 @@ fn read_load(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> 
             (frequency > 0.0).then(|| Drive::Harmonic { mean: 0.0, terms: vec![term] })
         }
     };
-    let load = Load { on: reader.points[0], force: vector("force")?, torque: vector("torque")?, axes, factor };
-    reader.check_effect(load.force != Vec3::zeros() || load.torque != Vec3::zeros(), "force, torque")?;
-    Ok(ElementKind::Load(load))
+    reader.check_given(&["force", "torque"])?;
+    Ok(ElementKind::Load(Load {
+        on: reader.points[0],
+        force: vector("force")?,
+        torque: vector("torque")?,
+        axes,
+        factor,
+    }))
 }
 
 fn read_joint_spring(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
@@ -550,15 +566,16 @@ fn read_motor(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError>
         limit: reader.number("limit")?,
         target: reader.law("target")?,
     };
-    let follows = motor.stiffness > 0.0 || motor.damping > 0.0;
-    let key = if reader.on_hinge() { "torque" } else { "force" };
-    reader.check_effect(motor.force != 0.0 || follows, &format!("{key}, stiffness, damping"))?;
-    match (follows, &motor.target) {
-        (true, None) => return reader.fault("target", "missing; stiffness and damping pull towards it"),
-        (false, Some(_)) => {
-            return reader.fault("target", "has no effect: stiffness and damping, which pull towards it, are 0");
+    reader.check_given(&[if reader.on_hinge() { "torque" } else { "force" }, "stiffness", "damping"])?;
+    match &motor.target {
+        None if motor.stiffness > 0.0 || motor.damping > 0.0 => {
+            return reader.fault("target", "missing; stiffness and damping pull towards it");
         }
-        _ => reader.refuse_function(motor.target.as_ref(), "target", "motor")?,
+        Some(_) if ["stiffness", "damping"].iter().all(|key| reader.section.get(key).is_none()) => {
+            let why = "has no effect: stiffness and damping, which pull towards it, are missing; one must be given, if only as 0";
+            return reader.fault("target", why);
+        }
+        target => reader.refuse_function(target.as_ref(), "target", "motor")?,
     }
     Ok(ElementKind::Motor(motor))
 }

@@ -153,7 +153,9 @@ impl LiveScene {
         {
             return Err(StateMismatch);
         }
-        self.simulation.resume(snapshot)?;
+        let mut snapshot = snapshot.clone();
+        snapshot.adopt_elements(self.simulation.model(), &running.machine);
+        self.simulation.resume(&snapshot)?;
         self.running = Arc::new(running);
         self.pending = Arc::new(pending);
         Ok(())

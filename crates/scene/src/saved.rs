@@ -6,7 +6,7 @@ use serde::Deserialize as _;
 use serde_json::{Map, Value as Json, json};
 
 /// Version of the layout.
-const FORMAT: u64 = 8;
+const FORMAT: u64 = 9;
 
 /// A state of a run, with the scene to which it belongs.
 #[derive(Clone, Debug)]
@@ -73,7 +73,8 @@ impl SavedState {
         meta.insert("step_end_s".into(), json!(snapshot.time()));
         insert_texts(&mut meta, scene);
         let values = serde_json::to_value(snapshot).unwrap_or_default();
-        if Snapshot::deserialize(&values).ok().as_ref() != Some(snapshot) {
+        let read = Snapshot::deserialize(&values).ok();
+        if read.map(|read| read.with_elements_of(snapshot)).as_ref() != Some(snapshot) {
             return Err(SavedStateError::NotFinite);
         }
         let mut content = Map::new();

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LooseJoint, Machine, Solver, Vec3};
+use super::{Element, LiveElements, LooseJoint, Machine, Solver, Vec3};
 use crate::contact;
 
 /// Gravity, contacts and stepper of a machine: a running simulation may adopt others.
@@ -29,8 +29,8 @@ impl Machine {
         }
     }
 
-    /// This machine under other conditions, given for as many ball joints.
-    pub(crate) fn with_conditions(&self, conditions: &Conditions) -> Self {
+    /// This machine under other conditions, given for as many joints with play, and with its elements as they act.
+    pub(crate) fn with_conditions(&self, conditions: &Conditions, elements: &LiveElements) -> Self {
         let mut machine = self.clone();
         machine.gravity = conditions.gravity;
         machine.contact = conditions.contact;
@@ -38,11 +38,14 @@ impl Machine {
             joint.contact = *contact;
         }
         machine.solver = conditions.solver;
+        if !elements.is_as_started() {
+            machine.elements = (0..self.elements.len()).map(|i| elements.element(self, i).into_owned()).collect();
+        }
         machine
     }
 
-    /// Whether `next` differs from this machine only in its conditions. The energy ledger does not count as one: it begins with
-    /// the run.
+    /// Whether `next` differs from this machine only in its conditions and in forces of its elements. The energy ledger does not
+    /// count as a condition: it begins with the run.
     pub fn differs_only_in_conditions(&self, next: &Self) -> bool {
         // Compared field by field, without a copy of the machine: a slider asks at every move.
         let Self { gravity: _, contact: _, solver, loose_joints, formulation, closed_form, output, start, .. } = self;
@@ -54,6 +57,8 @@ impl Machine {
             && loose_joints.len() == next.loose_joints.len()
             && loose_joints.iter().zip(&next.loose_joints).all(differ_in_contact)
             && (bodies, joints, closing_joints) == (&next.bodies, &next.joints, &next.closing_joints)
-            && (elements, fixed_shapes) == (&next.elements, &next.fixed_shapes)
+            && elements.len() == next.elements.len()
+            && elements.iter().zip(&next.elements).all(|(own, next)| own == next || Element::can_become(own, next))
+            && *fixed_shapes == next.fixed_shapes
     }
 }

@@ -1,5 +1,6 @@
 //! Machines as typed data in SI units: bodies, joints, drives and force elements, built in code or read from a scene file.
 
+mod applied;
 mod body;
 mod check;
 mod closed_form;
@@ -18,6 +19,7 @@ mod roles;
 mod settings;
 mod solid;
 
+pub use applied::{AppliedForces, ControlFault, ElementNumber, LiveElements};
 pub use body::*;
 pub use check::{ContactConflict, ContactFault, MIN_IMPACT_STEPS, MachineFault, MasslessFault};
 pub use closed_form::{ClosedForm, Function, Path};

@@ -14,6 +14,7 @@ mod contacts;
 mod coupled;
 mod discrete_gradient;
 mod drives;
+mod dynamics;
 mod elements;
 mod equations;
 mod equilibrium;
@@ -49,7 +50,9 @@ pub use bounds::{Advice, CostlyTask, LimitedQuantity, MAX_DENSE};
 pub use closed_form::{ClosedMotion, Unreachable};
 pub use contacts::{Contacts, Ramp};
 pub use discrete_gradient::StepStart;
+pub(crate) use drives::law_of;
 pub use drives::{Law, laws_of, periods_of};
+pub use dynamics::Coordinate;
 pub use elements::{ActiveSet, Counts, EdgeIndicator, ElementReport, Gap, Powers, Pull, WallContact};
 use flight::ActiveRanges;
 pub use flight::{Flight, FreeFlightBody};
@@ -65,9 +68,9 @@ pub use systems::Evaluator;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::machine::{Formulation, Machine, MachineFault, Mat3, StartRule, Vec3};
+use crate::machine::{Formulation, LiveElements, Machine, MachineFault, Mat3, StartRule, Vec3};
 use crate::units::format_quantity_digits;
-use elements::{ForceElement, elements_of};
+use elements::{ForceElement, element_of, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
 use forest::Forest;
 use lagrange::Lagrange;
@@ -338,8 +341,10 @@ pub struct Mechanism {
     paths: Vec<Option<Path>>,
     /// The scene's elements in its order, then the pulling hand, if any.
     elements: Vec<Box<dyn ForceElement>>,
-    /// Time laws of the elements.
-    element_laws: Vec<Arc<dyn Law>>,
+    /// Time law of each of the scene's elements, if it follows one.
+    element_laws: Vec<Option<Arc<dyn Law>>>,
+    /// Changes of the scene's elements since the start.
+    live: LiveElements,
     /// Number of the scene's elements.
     scene_elements: usize,
     pull: Option<Pull>,
@@ -417,7 +422,8 @@ impl Mechanism {
             evaluation_time: bounds::evaluation_time(machine, &model),
             sources: power::Sources::new(&model, &*equations, machine.elements.len()),
             elements: elements_of(machine, &model),
-            element_laws: machine.elements.iter().filter_map(drives::law_of).collect(),
+            element_laws: machine.elements.iter().map(drives::law_of).collect(),
+            live: LiveElements::default(),
             scene_elements: machine.elements.len(),
             pull: None,
             turns: Turns::new(machine, &model),
@@ -471,7 +477,7 @@ impl Mechanism {
 
     /// Maximum step if the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub(crate) fn kinematic_step(&self) -> f64 {
-        let laws = self.element_laws.iter();
+        let laws = self.element_laws.iter().flatten();
         laws.map(|law| law.shortest_period()).fold(self.model.shortest_period, f64::min) / 50.0
     }
 
@@ -482,7 +488,7 @@ impl Mechanism {
 
     /// Latest end of an adaptive step that starts at `t`, s.
     pub fn step_end(&self, t: f64) -> f64 {
-        let laws = self.element_laws.iter();
+        let laws = self.element_laws.iter().flatten();
         laws.map(|law| law.step_end(t)).fold(self.model.step_end(t), f64::min)
     }
 
@@ -772,6 +778,43 @@ impl Mechanism {
         }
         let elements = self.elements.len();
         self.sources = power::Sources::new(&self.model, &*self.equations, elements);
+    }
+
+    /// Lets the scene's elements act as `live` says; `machine` is what these equations were set up from.
+    ///
+    /// # Errors
+    /// The discrete-gradient method is prepared, and forces of the elements would couple the contacts too widely for it; nothing
+    /// has changed then.
+    pub(crate) fn set_elements(&mut self, machine: &Machine, live: &LiveElements) -> Result<(), MechanismError> {
+        if self.live == *live {
+            return Ok(());
+        }
+        let before = std::mem::replace(&mut self.live, live.clone());
+        let differs = |i: &usize| before.element(machine, *i) != live.element(machine, *i);
+        let changed: Vec<usize> = (0..self.scene_elements).filter(differs).collect();
+        if let Err(error) = self.replace_elements(machine, &changed) {
+            self.live = before;
+            self.replace_elements(machine, &changed)?;
+            return Err(error);
+        }
+        Ok(())
+    }
+
+    /// Builds these elements anew.
+    fn replace_elements(&mut self, machine: &Machine, which: &[usize]) -> Result<(), MechanismError> {
+        let mut other_ends = false;
+        for &i in which {
+            let element = self.live.element(machine, i);
+            let next = element_of(machine, &self.model, &element);
+            self.element_laws[i] = drives::law_of(&element);
+            let motion = self.equations.motion();
+            other_ends |= next.ends(motion).is_some() != self.elements[i].ends(motion).is_some();
+            self.elements[i] = next;
+        }
+        if other_ends && self.discrete.take().is_some() {
+            self.prepare_discrete_gradient()?;
+        }
+        Ok(())
     }
 
     /// Whether the force of any element depends on motion in a possibly stiff way.

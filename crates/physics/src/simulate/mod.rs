@@ -23,7 +23,8 @@ pub use impacts::{ForcePeak, Impact, ImpactEvent};
 pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
 pub use simulation::{
-    CLEARANCE_SPEED, ChangeError, Model, ProbeFault, Simulation, Snapshot, State, StateMismatch, Workspace, closed,
+    CLEARANCE_SPEED, ChangeError, Linearisation, Model, ProbeFault, RestartError, Simulation, Snapshot, State,
+    StateMismatch, Workspace, closed,
 };
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};
@@ -31,7 +32,7 @@ pub use wear::{Cell, Edges, Grid, Wear};
 use serde::{Deserialize, Serialize};
 
 use crate::machine::Vec3;
-pub use crate::mechanism::Pull;
+pub use crate::mechanism::{Coordinate, Pull};
 use crate::mechanism::{Counts, MechanismError};
 
 /// The longest run, s: at its end a double still resolves 0.1 ns.

@@ -16,6 +16,7 @@ mod ideal;
 mod live;
 mod model;
 mod observations;
+mod restart;
 mod sample;
 mod search;
 mod state;
@@ -37,7 +38,7 @@ use super::{
 };
 use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Controller, Polynomial};
-use crate::machine::{Conditions, Machine, Vec3};
+use crate::machine::{AppliedForces, Conditions, ControlFault, ElementNumber, LiveElements, Machine, Vec3};
 use crate::mechanism::{self, ContactId, Counts, EdgeIndicator, ElementReport, Flight, Mechanism, Pull, Ramp};
 use adaptive::FullStep;
 use automatic::SchemeSelector;
@@ -47,6 +48,7 @@ pub use ideal::{ProbeFault, closed};
 pub use live::ChangeError;
 use observations::Observations;
 pub use observations::Snapshot;
+pub use restart::{Linearisation, RestartError};
 
 /// Rate at which a clearance shrinks when a jump would place the ball inside its socket wall, m/s: an impact at this speed gives
 /// a force of the order of the static ones.
@@ -110,6 +112,8 @@ pub struct State {
     quarter_turns: Vec<i64>,
     /// Gravity, contacts and stepper with the live changes so far.
     conditions: Conditions,
+    /// Force elements with the live changes so far.
+    elements: LiveElements,
     /// What each loose joint remembers, and each contact.
     joints: Vec<JointState>,
     contacts: Vec<ContactMemory>,
@@ -414,7 +418,7 @@ impl Simulation {
 
     /// The machine with the live changes so far.
     pub fn changed_machine(&self) -> Machine {
-        self.machine().with_conditions(self.conditions())
+        self.machine().with_conditions(self.conditions(), &self.state.elements)
     }
 
     /// Equations of motion at the latest evaluation.
@@ -578,24 +582,62 @@ impl Simulation {
         self.take_events().filter_map(ImpactEvent::finished)
     }
 
-    /// Adopts the gravity, contacts and stepper of `next`. Returns [`Effect::AtReset`] and changes nothing if `next` differs in
-    /// anything else, or if a ball joint becomes or ceases to be ideal, which changes the equations.
+    /// Adopts gravity, contacts, stepper and the forces of elements of `next`. Returns [`Effect::AtReset`] and changes nothing if
+    /// `next` differs in anything else, or if a joint with play becomes or ceases to be ideal, which changes the equations. What
+    /// [`Self::control`] set of an element holds until `next` has another one in its place.
     ///
     /// # Errors
     /// If the method is too costly for the equations; nothing has changed then.
     pub fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
-        let before = self.conditions().gravity;
+        let before = self.state.applied_forces();
         let effect = self.run().adopt(next)?;
-        let now = (self.time(), self.conditions().gravity);
-        if now.1 != before {
-            self.observations.set_gravity(&self.model, self.ideal.as_deref_mut(), now);
-        }
+        self.tell_ideal(&before);
         Ok(effect)
     }
 
-    /// Sets gravity from now on, m/s^2, and changes nothing else.
-    pub fn set_gravity(&mut self, gravity: Vec3) {
-        self.run().set_gravity(gravity);
+    /// Sets numbers of elements from now on: element, number and value, SI. They act together, at the cost of one evaluation.
+    ///
+    /// # Errors
+    /// An element or number that does not exist, a value out of range, or forces that the method cannot follow; nothing has
+    /// changed then.
+    pub fn control(&mut self, numbers: &[(usize, ElementNumber, f64)]) -> Result<(), ChangeError> {
+        let before = self.state.applied_forces();
+        self.run().control(numbers)?;
+        self.tell_ideal(&before);
+        Ok(())
+    }
+
+    /// Checks whether [`Self::control`] could set a number.
+    ///
+    /// # Errors
+    /// An element or number that does not exist, or a value out of range.
+    pub fn check_control(&self, i: usize, number: ElementNumber, value: f64) -> Result<(), ControlFault> {
+        live::check_control(self.machine(), &self.state.elements, (i, number, value))
+    }
+
+    /// Value now of a number of element `i`, SI, as [`Self::control`] sets it; `None` if it does not have that number.
+    ///
+    /// # Panics
+    /// An element that does not exist.
+    pub fn controlled(&self, i: usize, number: ElementNumber) -> Option<f64> {
+        live::number_at(&self.state.elements.element(self.machine(), i), number, self.time())
+    }
+
+    /// Lets the ideal motion follow what acts on the run now, unless that is still `before`.
+    fn tell_ideal(&mut self, before: &AppliedForces) {
+        let now = self.state.applied_forces();
+        if now != *before {
+            let time = self.time();
+            self.observations.set_applied_forces(&self.model, self.ideal.as_deref_mut(), (time, &now));
+        }
+    }
+
+    /// Lets `forces` act from now on, and changes nothing else.
+    ///
+    /// # Errors
+    /// Forces that the method cannot follow; nothing has changed then.
+    pub fn set_applied_forces(&mut self, forces: &AppliedForces) -> Result<(), ChangeError> {
+        self.run().set_applied_forces(forces)
     }
 
     /// Starts, changes or (with `None`) ends the pull of a hand on a body.

@@ -82,7 +82,7 @@ pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
 }
 
 /// Time law that an element follows, if any. The rate of a load's factor may jump.
-pub(super) fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
+pub(crate) fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
     let Description { law, is_external, .. } = element.describe();
     let (_, drive) = law?;
     match drive {

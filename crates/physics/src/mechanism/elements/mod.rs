@@ -320,25 +320,27 @@ pub(super) trait ForceElement: Send + Sync {
 
 /// The force elements of `machine`, in the order of the scene.
 pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn ForceElement>> {
-    let make = |element: &Element| -> Box<dyn ForceElement> {
-        let anchor = |point: &Attachment| model.anchor(machine, point);
-        let coordinate = |on: JointCoordinate| Coordinate::of(machine, model, on);
-        let law = law_of(element);
-        match &element.kind {
-            ElementKind::Spring(spring) => Box::new(Spring::new(spring, [&spring.from, &spring.to].map(anchor))),
-            ElementKind::Load(load) => Box::new(Load { load: load.clone(), on: anchor(&load.on), factor: law }),
-            ElementKind::JointSpring(spring) => {
-                Box::new(OnCoordinate { on: coordinate(spring.on), law: JointSpring::new(spring) })
-            }
-            ElementKind::Stop(stop) => Box::new(OnCoordinate { on: coordinate(stop.on), law: Stop::new(stop) }),
-            ElementKind::Bushing(bushing) => Box::new(Bushing::new(bushing, [&bushing.from, &bushing.to].map(anchor))),
-            ElementKind::Motor(motor) => {
-                Box::new(OnCoordinate { on: coordinate(motor.on), law: Motor { motor: motor.clone(), target: law } })
-            }
-            ElementKind::Tyre(tyre) => Box::new(Tyre::new(tyre, anchor(&tyre.on), law)),
+    machine.elements.iter().map(|element| element_of(machine, model, element)).collect()
+}
+
+/// The force element for `element`, of `machine` or in place of one of its own.
+pub(super) fn element_of(machine: &Machine, model: &Model, element: &Element) -> Box<dyn ForceElement> {
+    let anchor = |point: &Attachment| model.anchor(machine, point);
+    let coordinate = |on: JointCoordinate| Coordinate::of(machine, model, on);
+    let law = law_of(element);
+    match &element.kind {
+        ElementKind::Spring(spring) => Box::new(Spring::new(spring, [&spring.from, &spring.to].map(anchor))),
+        ElementKind::Load(load) => Box::new(Load { load: load.clone(), on: anchor(&load.on), factor: law }),
+        ElementKind::JointSpring(spring) => {
+            Box::new(OnCoordinate { on: coordinate(spring.on), law: JointSpring::new(spring) })
         }
-    };
-    machine.elements.iter().map(make).collect()
+        ElementKind::Stop(stop) => Box::new(OnCoordinate { on: coordinate(stop.on), law: Stop::new(stop) }),
+        ElementKind::Bushing(bushing) => Box::new(Bushing::new(bushing, [&bushing.from, &bushing.to].map(anchor))),
+        ElementKind::Motor(motor) => {
+            Box::new(OnCoordinate { on: coordinate(motor.on), law: Motor { motor: motor.clone(), target: law } })
+        }
+        ElementKind::Tyre(tyre) => Box::new(Tyre::new(tyre, anchor(&tyre.on), law)),
+    }
 }
 
 /// The element for the `force`, N, of gravity on body `body`.

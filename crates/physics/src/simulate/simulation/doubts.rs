@@ -42,7 +42,8 @@ struct DoubtContext<'a> {
 
 /// As [`Model::doubts`].
 pub(super) fn doubts(model: &Model, state: &State) -> Vec<Doubt> {
-    DoubtContext { machine: model.machine().with_conditions(&state.conditions), state }.doubts()
+    let machine = model.machine().with_conditions(&state.conditions, &state.elements);
+    DoubtContext { machine, state }.doubts()
 }
 
 impl DoubtContext<'_> {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{IdealModel, IdealSource, IdealState, IdealWorkspace, Model, StateMismatch, Stepping};
 use crate::integrate::Method;
-use crate::machine::{Formulation, Machine, StartRule, Vec3};
+use crate::machine::{AppliedForces, Formulation, Machine, StartRule, Vec3};
 use crate::simulate::{Frame, StartError, Stopped};
 
 /// Tolerance of the ideal motion: without impacts, accuracy is cheap.
@@ -129,12 +129,18 @@ impl IdealModel {
         Some(tip - self.tip(state, work, frame.time)?)
     }
 
-    /// Sets gravity from `time` on, m/s^2.
-    pub(super) fn set_gravity(&self, state: &mut IdealState, work: &mut IdealWorkspace, time: f64, gravity: Vec3) {
+    /// Lets `forces` act from `time` on.
+    pub(super) fn set_applied_forces(
+        &self,
+        state: &mut IdealState,
+        work: &mut IdealWorkspace,
+        time: f64,
+        forces: &AppliedForces,
+    ) {
         self.tip(state, work, time);
         let mut run = Stepping::new(&self.model, &mut state.state, &mut work.workspace);
         run.rewind_to(time);
-        run.set_gravity(gravity);
+        run.set_applied_forces(forces).expect("an explicit method takes any forces");
         // Samples after `time` are no longer valid.
         state.tips.forget_after(time);
         self.record_tip(state, work);
@@ -145,6 +151,16 @@ impl IdealState {
     /// As [`State::bytes`](super::State::bytes).
     pub(super) fn bytes(&self) -> usize {
         self.state.bytes() + std::mem::size_of_val(&self.tips.ring[..])
+    }
+
+    /// Takes over the elements of `next`, which act in it already, after it was read.
+    pub(super) fn adopt_elements(&mut self, own: &IdealModel, next: &Machine) {
+        self.state.elements.adopt(&own.model.machine, next);
+    }
+
+    /// As [`Snapshot::with_elements_of`](super::Snapshot::with_elements_of).
+    pub(super) fn share_elements(&mut self, written: &Self) {
+        self.state.elements.share(&written.state.elements);
     }
 
     /// Checks a state that was read against its model.

@@ -5,8 +5,11 @@ use super::workspace::sync_parameters;
 use super::{CLEARANCE_SPEED, Stepping};
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
-use crate::machine::{LooseJoint, Machine, Vec3};
-use crate::mechanism::{ContactId, MechanismError, Pull, Ramp};
+use crate::jet::Jet;
+use crate::machine::{
+    AppliedForces, ControlFault, Drive, Element, ElementKind, ElementNumber, LiveElements, LooseJoint, Machine,
+};
+use crate::mechanism::{ContactId, MechanismError, Pull, Ramp, law_of};
 use crate::simulate::Effect;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
 
@@ -16,9 +19,12 @@ const MAX_HAND_DISTANCE: f64 = 1e6;
 /// Why a running simulation was not changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChangeError {
-    /// A method that the equations do not allow.
+    /// A method that the equations do not allow, or no longer with these forces.
     #[error("solver.method: {0}")]
     Method(#[from] MechanismError),
+    /// A number of an element that cannot be set.
+    #[error(transparent)]
+    Control(#[from] ControlFault),
     /// A pull on a body that does not exist.
     #[error("body {body} is pulled, of {bodies} (counted from 0)")]
     NoBody {
@@ -48,6 +54,32 @@ pub(in crate::simulate) fn check_pull(machine: &Machine, pull: &Pull) -> Result<
     }
 }
 
+/// As [`Simulation::check_control`](crate::simulate::Simulation::check_control).
+pub(super) fn check_control(
+    machine: &Machine,
+    elements: &LiveElements,
+    (i, number, value): (usize, ElementNumber, f64),
+) -> Result<(), ControlFault> {
+    if i >= machine.elements.len() {
+        return Err(ControlFault::NoElement { element: i, elements: machine.elements.len() });
+    }
+    elements.element(machine, i).check_number(number, value)
+}
+
+/// A motor's target at `time`, s; at rest at 0 if it has none.
+fn target_at(motor: &Element, time: f64) -> Jet {
+    law_of(motor).map_or_else(Jet::default, |law| law.at(time))
+}
+
+/// Value of a number of `element` at `time`, s; `None` if it does not have that.
+pub(super) fn number_at(element: &Element, number: ElementNumber, time: f64) -> Option<f64> {
+    match (&element.kind, number) {
+        (ElementKind::Motor(_), ElementNumber::Target) => Some(target_at(element, time).value),
+        (ElementKind::Motor(_), ElementNumber::TargetRate) => Some(target_at(element, time).rate),
+        _ => element.number(number),
+    }
+}
+
 impl Stepping<'_> {
     /// As [`Simulation::adopt`](crate::simulate::Simulation::adopt).
     pub(in crate::simulate) fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
@@ -62,6 +94,10 @@ impl Stepping<'_> {
         if other_method {
             prepare_implicit(self.mechanism, solver.method)?;
         }
+        let mut elements = self.state.elements.clone();
+        elements.adopt(self.machine, next);
+        self.mechanism.set_elements(self.machine, &elements)?;
+        self.state.elements = elements;
         let before = std::mem::replace(&mut self.state.conditions, next.conditions());
         for (j, old) in before.joints.iter().enumerate() {
             if self.state.conditions.joints[j] != *old {
@@ -95,11 +131,42 @@ impl Stepping<'_> {
         self.record_change();
     }
 
-    /// Sets gravity from now on, m/s^2, and changes nothing else.
-    pub(in crate::simulate) fn set_gravity(&mut self, gravity: Vec3) {
-        self.state.conditions.gravity = gravity;
+    /// As [`Simulation::control`](crate::simulate::Simulation::control).
+    pub(in crate::simulate) fn control(&mut self, numbers: &[(usize, ElementNumber, f64)]) -> Result<(), ChangeError> {
+        let (time, machine) = (self.state.now.t, self.machine);
+        let mut elements = self.state.elements.clone();
+        for &(i, number, value) in numbers {
+            check_control(machine, &elements, (i, number, value))?;
+            let element = elements.element(machine, i);
+            if let (ElementKind::Motor(motor), ElementNumber::Target | ElementNumber::TargetRate) =
+                (&element.kind, number)
+            {
+                let now = target_at(&element, time);
+                // A target that is set while another law moves it stands still there.
+                let rate = if matches!(motor.target, Some(Drive::Constant { .. })) { now.rate } else { 0.0 };
+                let [position, rate] = if number == ElementNumber::Target { [value, rate] } else { [now.value, value] };
+                elements.set(i, ElementNumber::Target, position - rate * time);
+                elements.set(i, ElementNumber::TargetRate, rate);
+            } else {
+                elements.set(i, number, value);
+            }
+        }
+        self.mechanism.set_elements(machine, &elements)?;
+        self.state.elements = elements;
         self.sync_parameters();
         self.refresh();
+        self.record_change();
+        Ok(())
+    }
+
+    /// Lets `forces` act from now on, and changes nothing else.
+    pub(in crate::simulate) fn set_applied_forces(&mut self, forces: &AppliedForces) -> Result<(), ChangeError> {
+        self.mechanism.set_elements(self.machine, &forces.elements)?;
+        self.state.conditions.gravity = forces.gravity;
+        self.state.elements = forces.elements.clone();
+        self.sync_parameters();
+        self.refresh();
+        Ok(())
     }
 
     fn sync_parameters(&mut self) {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{IdealSource, IdealState, IdealWorkspace, Model, State, StateMismatch, Stepping, Workspace};
-use crate::machine::Vec3;
+use crate::machine::{AppliedForces, Machine};
 use crate::simulate::{Frame, LoadPeaks};
 
 /// Interval at which non-contact loads are recorded, s, if steps are shorter and no contact is near its peak.
@@ -41,6 +41,24 @@ impl Snapshot {
     /// Approximate size in bytes, rounded up.
     pub fn bytes(&self) -> usize {
         self.state.bytes() + self.observations.ideal.as_ref().map_or(0, |ideal| ideal.bytes())
+    }
+
+    /// This snapshot, which was written and read, with the elements of the one that was written, which a file leaves to its scene.
+    pub fn with_elements_of(mut self, written: &Self) -> Self {
+        self.state.elements.share(&written.state.elements);
+        if let (Some(own), Some(other)) = (&mut self.observations.ideal, &written.observations.ideal) {
+            own.share_elements(other);
+        }
+        self
+    }
+
+    /// Takes over the elements of `next`, the machine of the scene in effect, which act in it already. A snapshot that was read does
+    /// not have them.
+    pub fn adopt_elements(&mut self, model: &Model, next: &Machine) {
+        self.state.elements.adopt(model.machine(), next);
+        if let (Some(source), Some(ideal)) = (model.ideal().simulated(), self.observations.ideal.as_deref_mut()) {
+            ideal.adopt_elements(source, next);
+        }
     }
 
     /// Checks a snapshot that was read from a file.
@@ -140,15 +158,15 @@ impl Observations {
         }
     }
 
-    /// Sets the gravity of the ideal motion from `time`, s, on, m/s^2.
-    pub(super) fn set_gravity(
+    /// Lets `forces` act on the ideal motion from `time`, s, on.
+    pub(super) fn set_applied_forces(
         &mut self,
         model: &Model,
         ideal: Option<&mut IdealWorkspace>,
-        (time, gravity): (f64, Vec3),
+        (time, forces): (f64, &AppliedForces),
     ) {
         if let (Some(source), Some((state, work))) = (model.ideal().simulated(), self.ideal.as_deref_mut().zip(ideal)) {
-            source.set_gravity(state, work, time, gravity);
+            source.set_applied_forces(state, work, time, forces);
         }
     }
 }

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Polynomial, Step};
-use crate::machine::Conditions;
+use crate::machine::{AppliedForces, Conditions, LiveElements};
 use crate::mechanism::{ContactId, Flight, Mechanism, Pull};
 use crate::simulate::impacts::{ForcePeak, Impact, Impacts};
 use crate::simulate::ledger::{Account, Ledger};
@@ -78,6 +78,7 @@ impl State {
             quarter_turns,
             joints: (0..joints).map(|j| JointState::new(mechanism, j)).collect(),
             contacts: (0..contacts).map(|c| ContactMemory::new(mechanism, c)).collect(),
+            elements: LiveElements::default(),
             pull: None,
             flights: vec![None; mechanism.free_flight_bodies().len()],
             control: Control {
@@ -127,6 +128,16 @@ impl State {
     /// Gravity, contacts and stepper with the live changes so far.
     pub fn conditions(&self) -> &Conditions {
         &self.conditions
+    }
+
+    /// The force elements with the live changes so far.
+    pub fn elements(&self) -> &LiveElements {
+        &self.elements
+    }
+
+    /// Gravity and force elements with the live changes so far.
+    pub fn applied_forces(&self) -> AppliedForces {
+        AppliedForces { gravity: self.conditions.gravity, elements: self.elements.clone() }
     }
 
     /// Clearance of ball joint `j`, m.
@@ -225,7 +236,14 @@ impl State {
         let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
         let flights = self.flights.len() * size_of::<Option<Flight>>();
         let turns = (self.quarter_turns.len() + self.record.quarter_turns.len()) * size_of::<i64>();
-        FIXED + turns + wear + flights + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
+        FIXED
+            + turns
+            + wear
+            + flights
+            + self.elements.bytes()
+            + coordinates * COPIES * size_of::<f64>()
+            + joints * OF_JOINT
+            + impacts
     }
 
     /// Checks a state that was read: it has the dimensions of a state of `model`, which began as `own`, and all its indices are
@@ -242,7 +260,8 @@ impl State {
             && self.quarter_turns.len() == own.quarter_turns.len()
             && record.quarter_turns.len() == own.record.quarter_turns.len()
             && loose(conditions) == loose(&own.conditions)
-            && model.machine().with_conditions(conditions).check().is_ok()
+            && self.elements.fits(model.machine())
+            && model.machine().with_conditions(conditions, &self.elements).check().is_ok()
             && self.joints.iter().map(|joint| joint.contacts).eq(own.joints.iter().map(|joint| joint.contacts))
             && self.contacts.len() == contacts
             && self.flights.len() == own.flights.len()

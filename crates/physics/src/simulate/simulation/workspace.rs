@@ -89,6 +89,7 @@ impl Workspace {
 /// Prepares the equations for the conditions, clearances and pull of `state`.
 pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &State) {
     mechanism.forget_evaluation();
+    mechanism.set_elements(model.machine(), &state.elements).expect("checked when the state adopted them");
     mechanism.gravity = state.conditions.gravity;
     mechanism.set_quarter_turns(state.now.t, state.quarter_turns.iter().chain(&state.record.quarter_turns));
     if mechanism.pull() != state.pull {
