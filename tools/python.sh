@@ -41,6 +41,7 @@ python_test() {
     rm -rf "$wheels"
     build_wheel "$python_env" "$wheels" --profile dev --features alike
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall "$wheels"/*.whl
+    "$python_env/bin/mypy" --strict --no-error-summary --cache-dir "$python_env/.mypy" python/jointplay
     # -P: without the current folder in the path, the installed package is tested.
     "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests "$@"
     # `./run lab` forwards to it.

@@ -9,7 +9,9 @@ Quantities are floats in SI units, or text with a unit ("0.5 mm"). The same scen
 program `jointplay`: compare `Run.hash` with the state hash that `jointplay run` prints.
 """
 
+from ._compare import Comparison, compare
 from ._control import Elements, Linearisation, Load, Motor, Spring
+from ._fit import FitStart, ParameterFit, fit
 from ._geometry import Shape
 from ._native import State, __version__
 from ._render import render
@@ -37,12 +39,14 @@ __all__ = [
     "Channel",
     "ChannelError",
     "Check",
+    "Comparison",
     "DoubtWarning",
     "Effects",
     "Elements",
     "Ends",
     "Estimate",
     "FitChoice",
+    "FitStart",
     "Fits",
     "Frame",
     "InUseError",
@@ -55,6 +59,7 @@ __all__ = [
     "OmissionWarning",
     "OptionError",
     "Parameter",
+    "ParameterFit",
     "Quality",
     "Quantity",
     "RejectDriver",
@@ -76,6 +81,8 @@ __all__ = [
     "Tradeoff",
     "TradeoffRow",
     "__version__",
+    "compare",
+    "fit",
     "render",
     "sensitivity",
     "sweep",

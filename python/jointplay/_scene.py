@@ -440,6 +440,8 @@ class Run(Mapping[str, NDArray[np.float64]]):
         rows = np.unique(np.linspace(0, run._rows - 1, frames).round().astype(int))
         span = 4.0 if slower is None else slower * self.end
         shapes, names = self.scene.geometry(), self.scene.bodies
+        if not shapes:
+            raise OptionError(f"{self.scene.name}: nothing is drawn of this scene: give its bodies shapes")
         return _show.animate(self.scene.name, shapes, names, run.time[rows], run.transforms[rows], 1e3 * span / len(rows))
 
     def impacts_to_pandas(self) -> pandas.DataFrame:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import math
 import os
@@ -19,6 +18,7 @@ from ._folder import check_replaceable, result_folder
 from ._options import library
 from ._scene import Quantity, Scene
 from ._study import Estimate, Runs, record_of
+from ._table import read_cells
 from .errors import OptionError
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from ._tolerance import Tolerance
 
 BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#404040"
-MAX_TABLE_SIZE = 64 << 20
-"""Size limit of a table that is read, bytes."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,36 +80,12 @@ def requests(arguments: argparse.Namespace) -> list[Request]:
 
 def read_rows(option: str, path: Path, heads: tuple[str, ...]) -> list[tuple[str, ...]]:
     """Place and cells of each row below the heading `heads` of a CSV file; lines that begin with # are comments."""
-    file = f"{option} {path}"
-    if path.exists() and not path.is_file():
-        raise OptionError(f"{file}: this is a folder, a pipe, a socket or a device, not a file")
-    with path.open("rb") as handle:
-        data = handle.read(MAX_TABLE_SIZE + 1)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise OptionError(f"{file}: this is not a text file: it is not valid UTF-8") from None
-    if len(data) > MAX_TABLE_SIZE:
-        raise OptionError(f"{file}: larger than {MAX_TABLE_SIZE >> 20} MiB")
-    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1)]
-    lines = [(number, line) for number, line in lines if line and not line.startswith("#")]
-    if len(lines) < 2:
-        raise OptionError(f"{file}: expected the heading {','.join(heads)} and below it one row per parameter")
-    rows = []
-    for number, line in lines:
-        place = f"{file}, line {number}"
-        if line.count('"') % 2:
-            raise OptionError(f"{place}: a quoted cell does not end on this line")
-        cells = [cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))]
-        if number == lines[0][0]:
-            if tuple(cells) != heads:
-                raise OptionError(f"{place}: expected the heading {','.join(heads)}, not {line}")
-            continue
-        if len(cells) != len(heads):
-            quotes = "; a cell with a comma needs quotes" if len(cells) > len(heads) else ""
-            raise OptionError(f"{place}: {len(cells)} cells for the {len(heads)} of the heading {','.join(heads)}{quotes}")
-        rows.append((place, *cells))
-    return rows
+    (place, found), *rows = read_cells(
+        f"{option} {path}", path, f"the heading {','.join(heads)} and below it one row per parameter"
+    )
+    if tuple(found) != heads:
+        raise OptionError(f"{place}: expected the heading {','.join(heads)}, not {','.join(found)}")
+    return [(place, *cells) for place, cells in rows]
 
 
 def perform(arguments: argparse.Namespace, compute: Callable[..., Any]) -> Any:

@@ -41,7 +41,7 @@ class Sweep:
         points: Points | None = None,
         periods: int | None = None,
         discard: int | None = None,
-        phase: float | None = None,
+        phase: Quantity | None = None,
         period: Quantity | None = None,
         exponent: bool = True,
         duration: Quantity | None = None,
@@ -60,8 +60,8 @@ class Sweep:
         The run of a point is one of
 
         - `periods` drive periods, the first `discard` of them a transient, with a Poincaré section at the `phase` of each (a
-          fraction of the period, 0 to below 1), a regime, and unless `exponent` is False the largest Lyapunov exponent; `period`,
-          s, replaces the common period of the drives;
+          fraction of the period, 0 to below 1, or an angle such as "90deg"), a regime, and unless `exponent` is False the largest
+          Lyapunov exponent; `period`, s, replaces the common period of the drives;
         - a `duration`, s, observed from `from_`, s, on;
         - `crossings` of `section` (`"crank.angle=90deg:up"`), the first `discard` of them a transient, within `duration`.
 
@@ -244,7 +244,7 @@ def sweep(
     points: Points | None = None,
     periods: int | None = None,
     discard: int | None = None,
-    phase: float | None = None,
+    phase: Quantity | None = None,
     period: Quantity | None = None,
     exponent: bool = True,
     duration: Quantity | None = None,

@@ -1,5 +1,6 @@
 //! Sweeps: the points that `jointplay sweep` computes, block by block or all at once.
 
+use std::fmt::Display;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +13,7 @@ use jointplay_analysis::sweep::Sweep;
 use jointplay_analysis::sweep_run::{RunFault, SweepRun};
 use jointplay_analysis::sweep_settings::settings;
 use jointplay_physics::suggest::nearest;
+use jointplay_physics::units::{Dimension, parse_quantity};
 use jointplay_scene::Scene;
 use numpy::ndarray::Array2;
 use numpy::{PyArray1, PyArray2};
@@ -79,11 +81,22 @@ fn start(py: Python<'_>, word: &str) -> PyResult<Start> {
     })
 }
 
+/// A phase of the drive: a fraction of the period, or text with the unit of an angle.
+fn phase(value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let wrong = |why: &dyn Display| option_error(value.py(), &format!("phase = {}: {why}", repr_of(value)));
+    let Ok(text) = value.cast::<PyString>() else {
+        return value.extract().map_err(|_| wrong(&"expected a fraction of the period, or text such as \"90deg\""));
+    };
+    let text = text.to_cow()?;
+    let angle = || parse_quantity(&text, Dimension::Angle).map(|angle| angle / std::f64::consts::TAU);
+    text.trim().parse().or_else(|_| angle()).map_err(|error| wrong(&error))
+}
+
 fn span(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<Span> {
     let request = SpanRequest {
         periods: count(options, "periods")?,
         discard: count(options, "discard")?,
-        phase: option(options, "phase")?.map(|phase| phase.extract()).transpose()?,
+        phase: option(options, "phase")?.map(|value| phase(&value)).transpose()?,
         period: time(options, "period")?,
         no_exponent: option(options, "exponent")?.map_or(Ok(false), |exponent| exponent.extract().map(|e: bool| !e))?,
         duration: time(options, "duration")?,

@@ -1,17 +1,20 @@
 """The installed package: typed, documented, and consistent with its documents."""
 
+import argparse
 import ast
 import inspect
 import os
 import re
 import subprocess
 import sys
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 
 import distributed
+import pytest
 
 import jointplay as jp
+from jointplay import __main__ as main
 from jointplay import _native
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,7 +27,7 @@ def test_the_installed_package_is_tested():
     wheel = metadata.distribution("jointplay").read_text("WHEEL")
     assert re.search(r"^Tag: cp310-abi3-", wheel, re.MULTILINE), wheel
     version = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)
-    assert metadata.version("jointplay") == version[1]
+    assert metadata.version("jointplay") == version[1] == jp.__version__
 
 
 def test_no_graphics_library_is_in_the_wheel():
@@ -56,6 +59,57 @@ def test_everything_public_is_documented():
         for member, value in vars(thing).items():
             if not member.startswith("_") and (callable(value) or isinstance(value, (property, staticmethod, classmethod))):
                 assert inspect.getdoc(getattr(thing, member)), f"{name}.{member}"
+
+
+def test_every_option_has_a_name():
+    # Misspelt options are refused by type checkers, and `help` shows all. `Scene.set` takes the names of parameters.
+    functions = [getattr(jp, name) for name in jp.__all__ if callable(getattr(jp, name))]
+    methods = [one for thing in functions if inspect.isclass(thing) for one in vars(thing).values() if inspect.isfunction(one)]
+    named = [one for one in functions + methods if inspect.isfunction(one) and not one.__name__.startswith("_")]
+    assert len(named) > 30
+    for one in named:
+        kinds = {parameter.kind for parameter in inspect.signature(one).parameters.values()}
+        assert inspect.Parameter.VAR_KEYWORD not in kinds or one is jp.Scene.set, one
+    assert "duration" in inspect.signature(jp.sweep).parameters
+    with pytest.raises(TypeError, match="duraton"):
+        jp.sweep(jp.Scene.load("pendulum"), {"contact.clearance": [1e-4]}, duraton="1 ms")
+
+
+@pytest.mark.parametrize("name", ["sensitivity", "tolerance"])
+def test_functions_and_commands_have_the_same_defaults(name):
+    parser = argparse.ArgumentParser()
+    import_module(f"jointplay._{name}_command").add_arguments(parser)
+    defaults = {action.dest: action.default for action in parser._actions}
+    shared = [one for one in inspect.signature(getattr(jp, name)).parameters.values() if one.name in defaults]
+    shared = [one for one in shared if one.name not in ("scene", "over", "yield_")]
+    assert len(shared) >= 6
+    for parameter in shared:
+        assert parameter.default == defaults[parameter.name], parameter.name
+
+
+def test_commands_of_the_program_are_named_as_such(program, capsys):
+    listed = re.findall(r"^  ([a-z]+) ", program("--help").partition("Commands:")[2].partition("Options:")[0], re.MULTILINE)
+    assert set(listed) - {"help"} == set(main.OF_PROGRAM)
+    assert not set(main.COMMANDS) & set(main.OF_PROGRAM)
+    assert main.main(["sweep", "four-bar"]) == 2
+    assert "`sweep` is a command of the program: `./run sweep …` or `jointplay sweep …`" in capsys.readouterr().err
+
+
+def test_a_missing_library_is_named_with_its_extra(monkeypatch):
+    run = jp.Scene.load("pendulum").run("1 ms", every="0.1 ms")
+    for name, extra, use in [
+        ("pandas", "pandas", run.to_pandas),
+        ("pandas", "pandas", run.impacts_to_pandas),
+        ("xarray", "xarray", run.to_xarray),
+        ("matplotlib", "studies", lambda: run.plot("S1.normal")),
+        ("scipy", "studies", lambda: jp.compare(run, dict(run), ["S1.normal"], cutoff=100.0)),
+    ]:
+        with monkeypatch.context() as lacking:
+            for known in [one for one in sys.modules if one == name or one.startswith(f"{name}.")]:
+                lacking.setitem(sys.modules, known, None)
+            lacking.setitem(sys.modules, name, None)
+            with pytest.raises(jp.OptionError, match=rf"needs {name}: pip install 'jointplay\[{extra}\]'"):
+                use()
 
 
 def test_documents_use_commands_and_options_of_the_package_that_exist():

@@ -64,7 +64,7 @@ def test_a_run_survives_pickling():
 def test_rows_are_at_the_requested_times():
     scene = jp.Scene.load("pendulum")
     assert np.allclose(scene.run("10 ms", every="3 ms").time, [0.0, 0.003, 0.006, 0.009], rtol=1e-15)
-    assert len(scene.run(0.02)) == 1001 and len(scene.run(0)) == 1
+    assert len(scene.run(0.02).time) == 1001 and len(scene.run(0).time) == 1
     # Rows change no step.
     assert scene.run("20 ms", every="7 us").hash == scene.run("20 ms", every="5 ms").hash
 
@@ -115,7 +115,7 @@ def test_a_stopped_run_has_its_rows():
         wild.run("1 s", every="1 ms", warn=False)
     error = caught.value
     assert isinstance(error, RuntimeError) and 0.0 <= error.time < 1.0 and "solver" in error.advice
-    assert 0 < len(error.run) < 1001 and error.run.end == error.time and np.all(np.isfinite(error.run["S1.normal"]))
+    assert 0 < len(error.run.time) < 1001 and error.run.end == error.time and np.all(np.isfinite(error.run["S1.normal"]))
 
 
 @pytest.mark.parametrize(
@@ -129,11 +129,77 @@ def test_a_stopped_run_has_its_rows():
         (([],), "text with a unit"),
         ((True,), "text with a unit"),
         (("1 ms", 0.0), "every = 0"),
+        (("1 ms", "2 ms"), "every = 0.002 s is longer than duration = 0.001 s"),
     ],
 )
 def test_times_are_checked(arguments, message):
     with pytest.raises(jp.OptionError, match=message):
         jp.Scene.load("pendulum").run(*arguments)
+
+
+def test_a_run_is_a_mapping_of_its_channels():
+    run = jp.Scene.load("four-bar").run("2 ms", every="1 ms")
+    assert list(run) == run.channels and len(run) == len(dict(run)) == len(run.channels)
+    assert all(dict(run)[name].tobytes() == run[name].tobytes() for name in run)
+    assert "A.force" in run and "A.nromal" not in run and run == run and run != run.scene.run("2 ms", every="1 ms")
+    table = np.asarray(run)
+    assert table.shape == (3,) and table.dtype.names == tuple(run.channels)
+    assert np.array_equal(table["A.normal"], run["A.normal"])
+    with pytest.raises(ValueError, match="is a copy"):
+        np.array(run, copy=False)
+
+
+def test_curves_name_their_channels_and_units():
+    run = jp.Scene.load("four-bar").run("2 ms", every="1 ms")
+    axes = run.plot("A_normal_N")
+    (line,) = axes.get_lines()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time, s", "A.normal, N")
+    assert np.array_equal(line.get_ydata(), run["A.normal"]) and np.array_equal(line.get_xdata(), run.time)
+    assert run.plot("A.force", "A.penetration", axes=axes) is axes
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        "A.normal, N",
+        *(f"A.force.{axis}, N" for axis in "xyz"),
+        "A.penetration, m",
+    ]
+    with pytest.raises(jp.ChannelError, match="did you mean `A.normal`"):
+        run.plot("A.nromal")
+
+
+def test_poses_are_those_of_the_simulation():
+    scene = jp.Scene.load("spcmm").set(clearance="0.5 mm")
+    run = scene.run("10 ms", every="5 ms", channels=["*.pose.*"], warn=False)
+    simulation = jp.Simulation(scene)
+    simulation.step_until("10 ms")
+    poses = simulation.frame().transforms
+    assert run.transforms.shape == (3, len(scene.bodies), 4, 4)
+    assert np.allclose(run.transforms[-1], poses, rtol=0.0, atol=1e-14) and (poses[:, 3] == [0.0, 0.0, 0.0, 1.0]).all()
+    with pytest.raises(jp.ChannelError, match="was not recorded"):
+        scene.run("1 ms", warn=False).transforms
+
+
+def test_a_run_moves_in_a_notebook():
+    scene = jp.Scene.load("four-bar")
+    # Also of a run that has not recorded the poses.
+    recorded = scene.run("4 ms", every="1 ms", channels=["*.pose.*"])
+    for run in [recorded, scene.run("4 ms", every="2 ms")]:
+        animation = run.animate(3, slower=50)
+        page = animation._repr_html_()
+        assert page.count("data:image/png") == 3 and "<script" in page and 'src="http' not in page.replace("https://maxcdn", "")
+        assert animation._interval == pytest.approx(1e3 * 50 * 4e-3 / 3)
+    animation._draw_frame(2)
+    assert animation._fig.axes[0].get_title() == "four-bar, t = 4.000 ms"
+    with pytest.raises(jp.OptionError, match="^frames = 1: "):
+        run.animate(1)
+
+
+def test_tables_have_units():
+    run = jp.Scene.load("four-bar").run("20 ms", every="1 ms")
+    data = run.to_xarray()
+    assert data["A.normal"].dims == ("time",) and data["A.normal"].attrs["units"] == "N" and data["time"].attrs["units"] == "s"
+    assert np.array_equal(data["A.normal"].sel(time=0.01, method="nearest"), run["A.normal"][10])
+    impacts = run.impacts_to_pandas()
+    assert len(impacts) == len(run.impacts) > 0 and set(impacts["joint"]) <= {"A", "B"}
+    assert impacts["peak_N"].to_numpy().tobytes() == run.impacts["peak_N"].tobytes()
 
 
 def test_more_rows_than_memory_are_refused():

@@ -63,6 +63,84 @@ def test_a_scene_survives_pickling(falling):
         assert again == scene and again.changes == scene.changes
 
 
+def test_a_changed_scene_is_saved_with_its_changes(falling, tmp_path):
+    for scene in [
+        jp.Scene.load("four-bar").set({"joint.A.clearance": 0.37e-3, "contact.friction": 0.11}),
+        jp.Scene.from_toml(falling),
+    ]:
+        file = tmp_path / "folder" / f"{scene.name}.toml"
+        scene.save(file)
+        saved = jp.Scene.load(file)
+        assert file.read_text() == scene.toml == saved.toml and saved.changes == {}
+        expected = scene.run("5 ms").hash
+        assert saved.run("5 ms").hash == expected == jp.Scene.from_dict(scene.to_dict()).run("5 ms").hash
+        assert all(saved[key] == scene[key] for key in scene.parameters)
+    assert jp.Scene.load("four-bar").to_dict()["body"][0]["name"] == "crank"
+    # Saved again, it replaces the file.
+    jp.Scene.from_toml(falling).set(friction=0.2).save(file)
+    assert jp.Scene.load(file)["contact.friction"] == 0.2 and jp.Scene.load(file).to_dict()["contact"]["friction"] == 0.2
+
+
+def test_the_files_that_a_scene_names_are_saved_beside_it(falling, tmp_path):
+    mesh = b"solid tetrahedron\n"
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    for face in [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]:
+        rows = "".join(f"vertex {x} {y} {z}\n" for x, y, z in corners[list(face)])
+        mesh += f"facet normal 0 0 0\nouter loop\n{rows}endloop\nendfacet\n".encode()
+    mesh += b"endsolid\n"
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "bob.stl").write_bytes(mesh)
+    text = falling.replace("[[joint]]", '[[body.shapes]]\nform = "mesh"\nfile = "parts/bob.stl"\nunit = "mm"\n[[joint]]', 1)
+    scene = jp.Scene.from_toml(text, folder=tmp_path)
+    scene.set(friction=0.3).save(tmp_path / "copy" / "bob.toml")
+    assert (tmp_path / "copy" / "parts" / "bob.stl").read_bytes() == mesh
+    again = jp.Scene.load(tmp_path / "copy" / "bob.toml")
+    (shape,) = again.geometry()
+    assert (shape.body, shape.kind, shape.dimensions) == ("bob", "mesh", {})
+    assert np.allclose(shape.vertices[shape.faces].reshape(-1, 3).max(axis=0), 1e-3, rtol=1e-6)
+    (tmp_path / "copy" / "parts" / "bob.stl").write_bytes(b"another")
+    with pytest.raises(jp.OptionError, match="bob.stl exists already"):
+        scene.save(tmp_path / "copy" / "bob.toml")
+    assert again["contact.friction"] == 0.3
+
+
+VOLUMES = {
+    "box": lambda d: np.prod(d["size"]),
+    "sphere": lambda d: 4 / 3 * np.pi * d["radius"] ** 3,
+    "cylinder": lambda d: np.pi * d["radius"] ** 2 * np.linalg.norm(d["to"] - d["from"]),
+    "cone": lambda d: np.pi / 3 * d["radius"] ** 2 * np.linalg.norm(d["to"] - d["from"]),
+    "capsule": lambda d: np.pi * d["radius"] ** 2 * (np.linalg.norm(d["to"] - d["from"]) + 4 / 3 * d["radius"]),
+}
+
+
+def test_shapes_are_closed_surfaces_of_their_dimensions():
+    kinds = set()
+    for name in ["spcmm", "governor", "excavator"]:
+        scene = jp.Scene.load(name)
+        for shape in scene.geometry():
+            kinds.add(shape.kind)
+            assert shape.body == "world" or shape.body in scene.bodies
+            edges = [tuple(face[[i, (i + 1) % 3]].tolist()) for face in shape.faces for i in range(3)]
+            assert len(set(edges)) == len(edges) and {(j, i) for i, j in edges} == set(edges), shape
+            a, b, c = shape.vertices[shape.faces].transpose(1, 0, 2)
+            volume = (a * np.cross(b, c)).sum() / 6
+            if shape.kind == "plate":
+                corners, thickness = shape.dimensions["corners"], shape.dimensions["thickness"]
+                first = corners - corners[0]
+                expected = 0.5 * thickness * np.linalg.norm(np.cross(first[1:-1], first[2:]).sum(axis=0))
+            else:
+                expected = VOLUMES[shape.kind](shape.dimensions)
+            # A prism of 16 sides fills 97.4 % of its cylinder; a ball of such rings 94 %.
+            assert (0.93 if shape.kind not in ("box", "plate") else 1 - 1e-9) * expected < volume < (1 + 1e-9) * expected, shape
+    assert kinds == {"box", "sphere", "cylinder", "cone", "capsule", "plate"}
+
+
+def test_a_body_without_shapes_has_bars_to_its_joints(hung):
+    shapes = [shape for shape in jp.Scene.from_toml(hung).geometry() if shape.body == "link1"]
+    assert [shape.kind for shape in shapes] == ["capsule", "capsule", "sphere"]
+    assert {tuple(shape.dimensions["to"]) for shape in shapes[:2]} == {(0.0, 0.0, 0.05), (0.0, 0.0, -0.05)}
+
+
 def test_the_check_counts_bodies_joints_and_degrees_of_freedom():
     check = jp.Scene.load("four-bar").check()
     assert (check.bodies, check.degrees_of_freedom, check.contacts, check.ideal_joints) == (3, 7, 2, 0)

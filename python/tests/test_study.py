@@ -1,5 +1,7 @@
 """Uncertain parameters: their distributions, and the machine as a function of them."""
 
+import copy
+import os
 import pickle
 import re
 
@@ -8,7 +10,7 @@ import pytest
 from scipy import stats
 
 import jointplay as jp
-from jointplay import _study
+from jointplay import _options, _study
 from jointplay._distribution import parse, uniform
 
 OVER = {"joint.*.clearance": "0.05mm..0.2mm", "contact.friction": "normal(0.15, 0.02, 0.05..0.25)"}
@@ -127,8 +129,30 @@ def test_a_study_is_a_function_of_its_parameters():
         run = scene.set(clearance=clearance).run("5 ms", warn=False)
         assert force == run.statistics["joints"]["A"]["peak_normal"]
     assert pickle.loads(pickle.dumps(study)).run([[2e-4]], threads=1).tolist() == results[1:].tolist()
-    with pytest.raises(jp.OptionError, match="2 numbers are given for 1"):
-        study.run([[1e-4, 2e-4]])
+    # With one parameter, a flat list has one run per value.
+    assert study.run([1e-4, 2e-4]).tobytes() == results.tobytes()
+    again = copy.deepcopy(study)
+    assert again.outputs == study.outputs and again.scene == scene
+    for wrong, message in [
+        ([[1e-4, 2e-4]], "2 numbers are given for 1"),
+        (np.zeros((1, 1, 1)), "shape (1, 1, 1)"),
+        ([["a"]], "one row per run and one column for each of contact.clearance: could not convert"),
+        ([[1e-4], [1e-4, 2e-4]], "one column for each of contact.clearance"),
+    ]:
+        with pytest.raises(jp.OptionError, match=re.escape(message)):
+            study.run(wrong)
+
+
+def test_a_row_without_a_result_is_named_and_costs_no_other_row():
+    study = jp.Study(jp.Scene.load("four-bar"), ["contact.clearance"], "A.normal:max", duration="5 ms")
+    with pytest.warns(jp.DoubtWarning, match=r"^four-bar: no result: values\[1\] = \[nan\] is not finite$"):
+        results = study.run([[1e-4], [np.nan], [2e-4]])
+    assert np.isnan(results[1]).all() and results[[0, 2]].tobytes() == study.run([1e-4, 2e-4]).tobytes()
+    with pytest.warns(jp.DoubtWarning, match=r"values\[0\] = \[inf\]"):
+        assert np.isnan(study.run([[np.inf]])).all()
+    coarse = jp.Scene.load("spcmm").set({"solver.method": "rk4", "solver.step": "1 ms"})
+    with pytest.warns(jp.DoubtWarning, match=r"values\[0\] diverged"):
+        assert np.isnan(jp.Study(coarse, ["contact.clearance"], "impacts", duration="1 s").run([[5e-4]])).all()
 
 
 def test_default_ranges_stay_within_what_is_allowed():
@@ -203,7 +227,10 @@ def test_an_interrupted_study_resumes(tmp_path):
 def test_threads_change_no_bit():
     study = jp.Study(jp.Scene.load("four-bar"), OVER, ["tip-error", "peak-force"], duration="5 ms")
     values = study.run([[1e-4, 1e-4, 0.1], [2e-4, 1e-4, 0.1], [1e-4, 2e-4, 0.2]], threads=1)
-    assert values.tobytes() == study.run([[1e-4, 1e-4, 0.1], [2e-4, 1e-4, 0.1], [1e-4, 2e-4, 0.2]], threads=3).tobytes()
+    for threads in [3, -1]:
+        again = study.run([[1e-4, 1e-4, 0.1], [2e-4, 1e-4, 0.1], [1e-4, 2e-4, 0.2]], threads=threads)
+        assert values.tobytes() == again.tobytes()
+    assert _options.workers(-1) == _options.workers(None) == os.cpu_count()
 
 
 @pytest.mark.parametrize("calls", [0, 1])
@@ -282,7 +309,21 @@ CLEARANCE = ["contact.clearance"]
             lambda scene: jp.Study(scene, ["body.coupler.mass"], duration="1 ms").run([[-1.0]]),
             "^body.coupler.mass: -1 kg: out of range; allowed above 0 up to 1e9 kg",
         ),
-        (lambda scene: jp.Study(scene, CLEARANCE).run([[1e-4]], threads=0), "^threads = 0: "),
+        (lambda scene: jp.Study(scene, CLEARANCE).run([[1e-4]], threads=0), "^threads = 0: .*, or -1 for one per core$"),
+        (lambda scene: jp.Study(scene, CLEARANCE).run([[1e-4]], threads=True), "^threads = True: "),
+        (
+            lambda scene: jp.Study(scene, {"contact.clearance": (1e-4, 2e-4)}),
+            "^over: contact.clearance: (0.0001, 0.0002) is not a distribution: expected text, a value, `LOW..HIGH`",
+        ),
+        (lambda scene: jp.Study(scene, {"contact.clearance": 1e-4}), "^over: contact.clearance: 0.0001 is not a distribution"),
+        (lambda scene: jp.Study(scene, 5), "^over = 5: expected a mapping"),
+        (lambda scene: jp.Study(scene, CLEARANCE, 5), "^output = 5: expected text"),
+        (lambda scene: jp.tolerance(scene, CLEARANCE, 5), "^limits: "),
+        (
+            lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": [1.0, 2.0, 3.0]}),
+            "expected an upper limit, or a lower and an",
+        ),
+        (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, yield_="99%"), "^yield_ = '99%': allowed above 0"),
         (lambda scene: jp.sensitivity(scene, CLEARANCE, "tip-eror"), "^output: tip-eror: expected CHANNEL"),
         (lambda scene: jp.sensitivity(scene, CLEARANCE, "impacts,impacts"), "impacts: given twice"),
         (lambda scene: jp.sensitivity(scene, CLEARANCE, rows=4), "^rows = 4: allowed .* 8 .* or 0 for no indices"),
@@ -304,7 +345,7 @@ CLEARANCE = ["contact.clearance"]
             "^sampling = 'sobl': there are: sobol",
         ),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, runs=0), "^runs = 0: allowed .* 2 to 1000000"),
-        (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, yield_=99), "^yield = 99: allowed above 0 up to 1"),
+        (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, yield_=99), "^yield_ = 99: allowed above 0 up to 1"),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, cost={}), "^cost: "),
         (
             lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, cost={"contact.friction": {"0..1": 1}}),

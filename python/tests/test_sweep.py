@@ -31,8 +31,8 @@ CASES = [
     (
         "slider-crank-driven",
         {"contact.friction": "0.1..0.2:3"},
-        {"periods": 3, "discard": 1, "start": ["cold", "follow-up"], "exponent": False},
-        ["--periods", "3", "--discard", "1", "--start", "cold,follow-up", "--no-exponent"],
+        {"periods": 3, "discard": 1, "start": ["cold", "follow-up"], "exponent": False, "phase": "90deg"},
+        ["--phase", "90deg", "--periods", "3", "--discard", "1", "--start", "cold,follow-up", "--no-exponent"],
     ),
 ]
 
@@ -58,7 +58,7 @@ def assert_same(result, written):
 def test_arrays_are_those_of_the_program(name, vary, options, arguments, program, tmp_path):
     written = archive(program, tmp_path, name, vary, arguments)
     sweep = jp.Sweep(jp.Scene.load(name), vary, **options)
-    for threads in [1, 3]:
+    for threads in [1, 3, -1]:
         assert_same(sweep.run(threads), written)
     assert_same(sweep.assemble(sweep.compute(block) for block in range(sweep.blocks)), written)
 
@@ -193,3 +193,33 @@ def test_errors_name_arguments_and_no_options_of_the_command_line(vary, options,
     with pytest.raises(jp.OptionError, match=message) as caught:
         jp.Sweep(jp.Scene.load("spcmm"), vary, **options)
     assert "--" not in str(caught.value)
+
+
+def test_a_dataset_has_a_dimension_per_parameter_with_its_unit():
+    scene = jp.Scene.load("slider-crank-driven")
+    vary = {"contact.clearance": [1e-4, 3e-4], "contact.friction": [0.1, 0.15, 0.2]}
+    result = jp.sweep(scene, vary, periods=3, discard=1, exponent=False, start=["cold", "follow-up"])
+    data = result.to_xarray()
+    assert dict(data.sizes) == {"start": 2, "contact.clearance": 2, "contact.friction": 3, "section": 2}
+    assert data["contact.clearance"].attrs["units"] == "m" and data["B_peak_kept_N"].attrs["units"] == "N"
+    assert data["section_vx_m_s"].dims[-1] == "section" and data["section_vx_m_s"].attrs["units"] == "m/s"
+    chosen = data["B_peak_kept_N"].sel({"start": "follow-up", "contact.clearance": 3e-4, "contact.friction": 0.15})
+    assert chosen == result["B_peak_kept_N"][1, 1, 1]
+    points = {"contact.clearance": [1e-4, 3e-4], "contact.friction": [0.1, 0.2]}
+    table = jp.sweep(scene, points=points, duration="2 ms").to_xarray()
+    assert table["status"].dims == ("point",) == table["contact.friction"].dims
+
+
+@pytest.mark.parametrize(
+    "vary, options, message",
+    [
+        ({"contact.clearance": 1e-4}, {}, "contact.clearance = 0.0001: expected a list of numbers or texts"),
+        ({"contact.clearance": [1e-4]}, {"periods": 2.5}, "periods = 2.5: expected a whole number"),
+        ({"contact.clearance": [1e-4]}, {"threads": 0}, "threads = 0: allowed whole numbers"),
+        ({"contact.clearance": [1e-4]}, {"phase": "90 mm"}, "phase = '90 mm': "),
+        ({"contact.clearance": [1e-4]}, {"phase": []}, "phase = ..: expected a fraction of the period, or text"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_sentences(vary, options, message):
+    with pytest.raises(jp.OptionError, match=message):
+        jp.sweep(jp.Scene.load("pendulum"), vary, duration="1 ms", **options)

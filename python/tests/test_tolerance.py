@@ -1,13 +1,16 @@
 """Lots of machines with limits: yields, percentiles, drivers of rejects, and the cheapest fits."""
 
 import itertools
+import json
 import pickle
 
 import numpy as np
+import pandas
 import pytest
 from scipy import stats
 
 import jointplay as jp
+from jointplay import __main__ as command
 from jointplay import _fits, _tolerance
 
 FOUR_BAR = {"joint.*.clearance": "0.05mm..0.2mm", "contact.friction": "normal(0.1, 0.01, 0.05..0.15)"}
@@ -243,3 +246,15 @@ def test_without_limits_the_order_of_candidates_is_not_checked():
     cost = {"joint.A.clearance": {"normal(0.1mm, 5um)": 1.0, "normal(0.1mm, 2um)": 2.0}}
     fits = jp.tolerance(machine(), FOUR_BAR, {"peak-force": 1e6}, runs=8, duration="1 ms", cost=cost, evaluations=1).fits
     assert fits.order_not_checked == ["joint.A.clearance"] and not fits.is_proven and fits.best.cost == 2.0
+
+
+def test_the_command_and_the_function_judge_the_same_lot(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    over, limit = {"joint.*.clearance": "0.05mm..0.2mm", "contact.friction": "normal(0.15, 0.02)"}, {"tip-error": "0.25 mm"}
+    lot = jp.tolerance(jp.Scene.load("four-bar"), over, limit, runs=64, duration="20 ms")
+    words = "tolerance four-bar --limit tip-error=0.25mm --runs 64 --duration 20ms --out lot --quiet --summary json".split()
+    assert command.main([*words, *(f"--over={key}={text}" for key, text in over.items())]) == 0
+    results = json.loads(capsys.readouterr().out)
+    assert results["yield"] == lot.yield_._asdict() and 0 < results["accepted"] == lot.accepted.sum() < 64
+    runs = pandas.read_csv(tmp_path / "lot" / "runs.csv")
+    assert np.allclose(runs.iloc[:, 1:4], lot.values, rtol=1e-11) and np.allclose(runs.iloc[:, 4:5], lot.results, rtol=1e-11)

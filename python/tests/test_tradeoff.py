@@ -14,7 +14,7 @@ def test_costs_and_errors_are_those_of_the_program(program, tmp_path):
     with (tmp_path / "results" / "tradeoff.csv").open() as file:
         expected = list(csv.DictReader(file))
     parts = []
-    result = jp.tradeoff(jp.Scene.load("pendulum"), progress=parts.append)
+    result = jp.tradeoff(jp.Scene.load("pendulum"), quick=True, progress=parts.append)
     assert parts[-1] <= 1.0 and len(parts) > 10
     assert len(result.rows) == len(expected)
     for row, of_program in zip(result.rows, expected, strict=True):
@@ -35,4 +35,4 @@ def test_an_error_in_progress_ends_the_measurement():
         raise LookupError(part)
 
     with pytest.raises(LookupError):
-        jp.tradeoff(jp.Scene.load("pendulum"), progress=fails)
+        jp.tradeoff(jp.Scene.load("pendulum"), quick=True, progress=fails)
