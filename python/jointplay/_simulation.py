@@ -96,12 +96,13 @@ class Simulation(_Guarded):
 
     scene: Scene
     """The scene as it was given."""
+    _elements_of: dict[type, Any]
 
     def __new__(cls, scene: Scene) -> Self:
         self = super().__new__(cls, scene._native)
         self.scene = scene
         self._is_plain = True
-        self._elements_of: dict[type, Any] = {}
+        self._elements_of = {}
         return self
 
     @property
