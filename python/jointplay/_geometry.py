@@ -54,8 +54,13 @@ def _shape(body: str, kind: str, numbers: dict[str, Any]) -> Shape:
     length = float(np.linalg.norm(axis))
     quarter = radius * np.exp(1j * np.linspace(0.0, np.pi / 2, TURNS // 4 + 1))
     caps = [(-z.real, z.imag) for z in quarter] + [(length + z.imag, z.real) for z in quarter]
-    profile = {"cylinder": [(0.0, 0.0), (0.0, radius), (length, radius), (length, 0.0)], "cone": [(0.0, 0.0), (0.0, radius), (length, 0.0)]}
-    return Shape(body, kind, own, *_revolved(start, axis / length if length else np.array([0.0, 0.0, 1.0]), profile.get(kind, caps)))
+    profile = {
+        "cylinder": [(0.0, 0.0), (0.0, radius), (length, radius), (length, 0.0)],
+        "cone": [(0.0, 0.0), (0.0, radius), (length, 0.0)],
+    }
+    return Shape(
+        body, kind, own, *_revolved(start, axis / length if length else np.array([0.0, 0.0, 1.0]), profile.get(kind, caps))
+    )
 
 
 def _revolved(

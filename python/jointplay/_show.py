@@ -35,7 +35,12 @@ def plot(axes: Any, time: NDArray[np.float64], curves: Iterable[tuple[str, str, 
 
 
 def animate(
-    title: str, shapes: Sequence[Shape], names: Sequence[str], time: NDArray[np.float64], poses: NDArray[np.float64], interval: float
+    title: str,
+    shapes: Sequence[Shape],
+    names: Sequence[str],
+    time: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    interval: float,
 ) -> Any:
     """A Matplotlib animation of `shapes` at the poses of the bodies `names`, shape (frames, bodies, 4, 4); `interval` in ms."""
     pyplot = library("matplotlib.pyplot")
