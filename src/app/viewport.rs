@@ -14,6 +14,7 @@ use super::overlay::{self, Overlay, Room, Strips};
 use super::pace::{Pace, ShownFrame};
 use super::player::Player;
 use super::pull::Grip;
+use super::ruler::RulerScale;
 use super::{ghosts, keys, opening, spoken, value, zoom};
 use crate::machine::Vec3 as Exact;
 use crate::render;
@@ -114,6 +115,8 @@ pub struct Viewport {
     pub(super) common: Option<f32>,
     /// Reference force of a run under reproduction, or of a film, N.
     run_scale: Option<f32>,
+    /// How the scale of the arrows changes.
+    pub(super) ruler: RulerScale,
     /// Whether only machine and time are shown for lack of room.
     pub(super) bare: bool,
     /// Whether the time is shown elsewhere in the window.
@@ -163,6 +166,7 @@ impl Viewport {
             cloud: None,
             common: None,
             run_scale: None,
+            ruler: RulerScale::default(),
             bare: false,
             hides_time: false,
             scene: Rect::ZERO,
@@ -614,6 +618,14 @@ impl Viewport {
         // Scale of the drawn picture, which may have fewer pixels than the screen.
         let Screen { scale, .. } = screen.with_quality(self.list.quality);
         let theme = self.options.theme;
+        if self.frozen.is_none() {
+            // Before the first force there is no scale.
+            let is_known = self.marks.largest() > 0.0 || self.options.arrows.reference.is_some();
+            let reference = self.list.legend.as_ref().filter(|_| is_known).map(|legend| legend.reference);
+            if let Some(left) = self.ruler.show(reference, ui.input(|input| input.time)) {
+                ui.ctx().request_repaint_after(Duration::from_secs_f64(left));
+            }
+        }
         let overlay = self.overlay(player, ghost_notes, room, self.hides_time);
         let strip_painter = ui.painter_at(whole);
         overlay::paint(&strip_painter, &strips, scale, &self.list, theme, &overlay, &mut self.places);
@@ -653,6 +665,7 @@ impl Viewport {
             notes: self.title.clone().into_iter().chain(following).chain(ghost_notes).collect(),
             legend: !self.bare,
             labels: !self.bare,
+            has_new_scale: self.frozen.is_none() && self.ruler.is_new(),
             room,
         }
     }
@@ -690,7 +703,8 @@ impl Viewport {
         let mut list = std::mem::take(&mut self.next);
         let reduced_screen = screen.with_quality(quality);
         let own_reference = self.options.arrows.reference;
-        self.options.arrows.reference = own_reference.or(self.common).or(self.run_scale);
+        let automatic = || Some(self.ruler.follow(self.marks.reference(&self.options.arrows)));
+        self.options.arrows.reference = own_reference.or(self.common).or(self.run_scale).or_else(automatic);
         let shot = shot!(self, player, camera, reduced_screen);
         self.view.build(&shot, &mut list);
         list.quality = quality;
