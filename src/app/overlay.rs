@@ -233,6 +233,8 @@ pub fn paint(
     if overlay.labels && fits_labels(whole) {
         let occupied = if list.overlay.is_empty() { Vec::new() } else { vec![triad(scene)] };
         labels::paint(painter, scene, scale, list, occupied, places);
+    } else {
+        places.clear_plates();
     }
 }
 
