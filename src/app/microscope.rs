@@ -9,6 +9,7 @@ use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, Wid
 use glam::Vec3;
 
 use super::keys::Action;
+use super::paths::of_clearance;
 use super::player::Player;
 use super::run::Run;
 use super::{layout, sound, spoken, theme, value};
@@ -34,6 +35,8 @@ const SECTION_HEIGHT: f32 = 112.0;
 const MIN_SECTION_HEIGHT: f32 = 76.0;
 /// Width from which pictures and numbers are side by side, points.
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 430.0;
+/// Least side of a phone's picture with the choice of the plane in sight below it, points.
+const MIN_SIDE_ABOVE_CHOICE: f32 = 110.0;
 /// Width of the numbers beside the pictures, points.
 const NUMBERS_WIDTH: f32 = 215.0;
 /// Least reference speed of the velocity arrow, m/s.
@@ -146,7 +149,14 @@ impl Microscope {
         } else {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
-                let side = if is_narrow { width.min(space.y) } else { draw::side(vec2(width, space.y), 150.0) };
+                let side = if is_narrow {
+                    // The choice below is shown whole or is scrolled to: a strip of it would look like a mistake.
+                    let choice = ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
+                    let above = space.y - choice;
+                    if above >= MIN_SIDE_ABOVE_CHOICE { width.min(above) } else { space.y }
+                } else {
+                    draw::side(vec2(width, space.y), 150.0)
+                };
                 self.picture(ui, player, &magnified, axes, vec2(width, side));
                 if is_narrow {
                     self.plane_choice(ui);
@@ -190,21 +200,22 @@ impl Microscope {
     fn circle_of(&mut self, sheet: &Sheet<'_>, player: &Player, axes: [Vec3; 2]) -> &'static str {
         let magnified = sheet.magnified();
         let now = player.pacer.shown();
-        let path = player.paths().between(self.joint, magnified.since, now);
+        // An older part would leave the present circle, or never reach it.
+        let path = of_clearance(player.paths().between(self.joint, magnified.since, now), magnified.report.clearance);
         let approach = magnified.impact.map_or(0.0, |impact| impact.approach_speed);
         let fastest = magnified.sliding.unwrap_or(magnified.velocity).norm();
         let speed = draw::round_up(approach.max(fastest).max(MIN_REFERENCE_SPEED));
         if magnified.kind == LooseKind::Ball {
             self.circle = Some(draw::sphere(sheet, axes, path, now, speed));
             return "The circle is the clearance; the ball's centre leaves it only by the penetration. The path, seen from \
-                    the socket, covers the latest six impacts and fades with age (recorded for the first 12 joints). In \
-                    contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the ball's \
+                    the socket, covers the latest six impacts since the clearance last changed, and fades with age (recorded for the \
+                    first 12 joints). In contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the ball's \
                     centre, in contact the sliding velocity of the friction law.";
         }
         self.circle = Some(draw::sphere(sheet, pin::across(magnified, axes), path, now, speed));
         "Section across the pin's axis. The circle is the clearance; the middle of the pin leaves it only by the \
-         penetration. The path covers the latest six impacts and fades with age (recorded for the first 12 joints). In \
-         contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the pin's middle."
+         penetration. The path covers the latest six impacts since the clearance last changed, and fades with age \
+         (recorded for the first 12 joints). In contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the pin's middle."
     }
 }
 

@@ -16,6 +16,8 @@ pub struct Point {
     pub time: f64,
     /// Position from the socket's centre, in the axes of the socket's body, m: the path turns with its socket.
     pub position: [f32; 3],
+    /// The joint's clearance then, m.
+    pub clearance: f32,
 }
 
 /// The latest path of each of the first [`RECORDED_JOINTS`] ball joints.
@@ -67,7 +69,7 @@ impl Paths {
                 points.drain(..MAX_POINTS / 2);
             }
             let time = frame.time;
-            points.push(Point { time, position });
+            points.push(Point { time, position, clearance: joint.clearance as f32 });
         }
     }
 
@@ -80,6 +82,12 @@ impl Paths {
         let end = path.points.partition_point(|point| point.time <= to);
         &path.points[start..end.max(start)]
     }
+}
+
+/// The end of `path` since the clearance was last another one than `clearance`, m.
+pub fn of_clearance(path: &[Point], clearance: f64) -> &[Point] {
+    let before = path.iter().rposition(|point| point.clearance != clearance as f32);
+    &path[before.map_or(0, |last| last + 1)..]
 }
 
 #[cfg(test)]
@@ -164,5 +172,22 @@ mod tests {
         assert_eq!(paths.between(0, 0.19999, ALL.1).len(), 1);
         // A ball at rest is one point.
         assert!(paths.between(1, ALL.0, ALL.1).len() == 1);
+    }
+
+    #[test]
+    fn after_the_clearance_has_shrunk_the_path_stays_within_it() {
+        let mut player = player("spcmm");
+        player.run_to(20e-3);
+        player.set("contact.clearance", "0.1 mm").expect("in range");
+        player.run_to(180e-3);
+        let clearance = player.frame().joints[0].clearance;
+        assert!((clearance - 0.1e-3).abs() < 1e-12, "it has arrived: {clearance}");
+        let all = player.paths().between(0, ALL.0, ALL.1);
+        let distance = |point: &Point| point.position.iter().map(|x| x * x).sum::<f32>().sqrt();
+        assert!(all.iter().any(|point| distance(point) > 0.2e-3), "earlier it was farther out");
+        let now = of_clearance(all, clearance);
+        assert!(now.len() > 20, "{}", now.len());
+        assert!(now.iter().all(|point| distance(point) < 1.05 * clearance as f32));
+        assert!(of_clearance(all, 0.2e-3).is_empty());
     }
 }
