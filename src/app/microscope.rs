@@ -36,7 +36,7 @@ const MIN_SECTION_HEIGHT: f32 = 76.0;
 /// Width from which pictures and numbers are side by side, points.
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 430.0;
 /// Least side of a phone's picture with the choice of the plane in sight below it, points.
-const MIN_SIDE_ABOVE_CHOICE: f32 = 110.0;
+const MIN_SIDE_ABOVE_CHOICE: f32 = 160.0;
 /// Width of the numbers beside the pictures, points.
 const NUMBERS_WIDTH: f32 = 215.0;
 /// Least reference speed of the velocity arrow, m/s.

@@ -1068,6 +1068,7 @@ fn a_low_plot_keeps_its_numbers() {
             // A low window shows the plots in a sheet.
             harness.key_press(Key::P);
         }
+        harness.state_mut().plots_mut().chosen = vec![Quantity::NormalForce, Quantity::Eccentricity];
         harness.state_mut().player_mut().run_to(9e-3);
         harness.run();
         let plots = harness.state_mut().plots_mut();
@@ -1090,6 +1091,7 @@ fn a_low_plot_keeps_its_numbers() {
 #[test]
 fn the_clearance_of_the_past_stays_where_it_was() {
     let mut harness = window("spcmm");
+    harness.state_mut().plots_mut().chosen = vec![Quantity::NormalForce, Quantity::Eccentricity];
     let player = harness.state_mut().player_mut();
     player.run_to(0.02);
     player.set("contact.clearance", "0.6 mm").expect("in range");

@@ -23,8 +23,9 @@ const CORNER_TRIAD: Vec2 = vec2(68.0, 58.0);
 const CORNER_SCALE: Vec2 = vec2(54.0, 30.0);
 /// Largest length of the scale, in clearances.
 const LARGEST_BAR: f64 = 0.9;
-/// Least side of a picture with axes, points.
-const MIN_SIDE_WITH_TRIAD: f32 = 170.0;
+/// Height of the words in a smaller picture, all in one line; least side of a picture with axes, and with words in two lines, points.
+const WORDS_LINE: f32 = 19.0;
+const MIN_SIDE_WITH_TRIAD: f32 = 190.0;
 /// Distance between the circle and the words, and between the places that are tried, points.
 const CORNER_GAP: f32 = 4.0;
 /// Steps of the radius, and the least one, as fractions of the picture's side.
@@ -166,6 +167,11 @@ pub struct Circle {
     pub radius: f32,
 }
 
+/// Size of the words in the upper left corner.
+fn corner_text(rect: Rect, has_triad: bool) -> Vec2 {
+    if has_triad { CORNER_TEXT } else { vec2(rect.width(), WORDS_LINE) }
+}
+
 /// The largest circle, and of these the one nearest to the middle of `rect`, that no words in its corners cross.
 fn place_circle(rect: Rect, has_triad: bool) -> Circle {
     let side = rect.size().min_elem();
@@ -176,7 +182,7 @@ fn place_circle(rect: Rect, has_triad: bool) -> Circle {
         let scale = vec2(CORNER_SCALE.x.max(LARGEST_BAR as f32 * radius + 14.0), CORNER_SCALE.y);
         let triad = Align2::LEFT_BOTTOM.align_size_within_rect(CORNER_TRIAD, rect);
         let words = [
-            Align2::LEFT_TOP.align_size_within_rect(CORNER_TEXT, rect),
+            Align2::LEFT_TOP.align_size_within_rect(corner_text(rect, has_triad), rect),
             Align2::RIGHT_BOTTOM.align_size_within_rect(scale, rect),
         ];
         let words: Vec<Rect> = words.into_iter().chain(has_triad.then_some(triad)).collect();
@@ -272,11 +278,15 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     painter.arrow(ruler, vec2(ARROW_LENGTH, 0.0), Stroke::new(2.0, moving));
     let words = value::quantity(speed, "m/s", 3);
     let beside = ruler + vec2(ARROW_LENGTH + 6.0, 0.0);
-    sheet.words(beside, Align2::LEFT_CENTER, &words, moving);
+    let speed = sheet.words(beside, Align2::LEFT_CENTER, &words, moving);
     if path.len() > 1 {
         let words = format!("path of {}", value::quantity(now - start, "ms", 3));
-        let below = ruler + vec2(0.0, 9.0);
-        sheet.words(below, Align2::LEFT_TOP, &words, new_colour);
+        let (at, align) = if has_triad {
+            (ruler + vec2(0.0, 9.0), Align2::LEFT_TOP)
+        } else {
+            (pos2(speed.right() + 8.0, ruler.y), Align2::LEFT_CENTER)
+        };
+        sheet.words(at, align, &words, new_colour);
     }
     circle
 }
@@ -409,7 +419,7 @@ mod tests {
             assert!(rect.contains_rect(Rect::from_center_size(centre, Vec2::splat(2.0 * radius))), "{rect}");
             let scale = vec2(CORNER_SCALE.x, CORNER_SCALE.y);
             let scale = Align2::RIGHT_BOTTOM.align_size_within_rect(scale, rect);
-            let words = Align2::LEFT_TOP.align_size_within_rect(CORNER_TEXT, rect);
+            let words = Align2::LEFT_TOP.align_size_within_rect(corner_text(rect, has_triad), rect);
             assert!(words.distance_to_pos(centre) > radius && scale.distance_to_pos(centre) > radius, "{rect}");
             assert!(radius >= 0.2 * rect.size().min_elem(), "{rect}: {radius}");
         }
