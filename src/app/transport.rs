@@ -205,7 +205,7 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     spoken::value(&response, &value::time_scale(scale).replace(':', " to "));
     response.accessible_name("Time scale");
     scales(ui, player);
-    if !narrow {
+    if !narrow && ui.available_width() >= TENS_WIDTH {
         tens(ui, player);
     }
     limit(ui, player);

@@ -23,9 +23,10 @@ const CORNER_TRIAD: Vec2 = vec2(68.0, 58.0);
 const CORNER_SCALE: Vec2 = vec2(54.0, 30.0);
 /// Largest length of the scale, in clearances.
 const LARGEST_BAR: f64 = 0.9;
-/// Height of the words in a smaller picture, all in one line; least side of a picture with axes, and with words in two lines, points.
+/// Height of the words in a picture without axes, all in one line, points.
 const WORDS_LINE: f32 = 19.0;
-const MIN_SIDE_WITH_TRIAD: f32 = 190.0;
+/// Least radius of the circle beside the axes, as a fraction of the picture's side; otherwise they are left out.
+const MIN_RADIUS_BESIDE_TRIAD: f32 = 0.34;
 /// Distance between the circle and the words, and between the places that are tried, points.
 const CORNER_GAP: f32 = 4.0;
 /// Steps of the radius, and the least one, as fractions of the picture's side.
@@ -172,8 +173,15 @@ fn corner_text(rect: Rect, has_triad: bool) -> Vec2 {
     if has_triad { CORNER_TEXT } else { vec2(rect.width(), WORDS_LINE) }
 }
 
+/// The place of the circle, and whether the axes have room beside it.
+fn place_circle(rect: Rect) -> (Circle, bool) {
+    let beside = largest_circle(rect, true);
+    let has_triad = beside.radius >= MIN_RADIUS_BESIDE_TRIAD * rect.size().min_elem();
+    if has_triad { (beside, true) } else { (largest_circle(rect, false), false) }
+}
+
 /// The largest circle, and of these the one nearest to the middle of `rect`, that no words in its corners cross.
-fn place_circle(rect: Rect, has_triad: bool) -> Circle {
+fn largest_circle(rect: Rect, has_triad: bool) -> Circle {
     let side = rect.size().min_elem();
     let steps = ((CIRCLE_RADIUS - MIN_CIRCLE_RADIUS) / RADIUS_STEP).round() as usize;
     let radii = (0..=steps).map(|step| side * (CIRCLE_RADIUS - RADIUS_STEP * step as f32));
@@ -206,8 +214,7 @@ fn place_circle(rect: Rect, has_triad: bool) -> Circle {
 pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
     let Sheet { painter, rect, palette, magnified, .. } = sheet;
     let report = &magnified.report;
-    let has_triad = rect.size().min_elem() >= MIN_SIDE_WITH_TRIAD;
-    let circle = place_circle(*rect, has_triad);
+    let (circle, has_triad) = place_circle(*rect);
     let clearance = report.clearance as f32;
     let scale = circle.radius / clearance;
     let project = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
@@ -414,8 +421,10 @@ mod tests {
             [[134.0, 134.0], [310.0, 240.0], [206.0, 150.0], [118.0, 110.0], [320.0, 320.0], [400.0, 96.0]]
         {
             let rect = Rect::from_min_size(pos2(10.0, 20.0), vec2(width, height));
-            let has_triad = rect.size().min_elem() >= MIN_SIDE_WITH_TRIAD;
-            let Circle { centre, radius } = place_circle(rect, has_triad);
+            let (Circle { centre, radius }, has_triad) = place_circle(rect);
+            let triad = Align2::LEFT_BOTTOM.align_size_within_rect(CORNER_TRIAD, rect);
+            assert!(!has_triad || triad.distance_to_pos(centre) > radius, "{rect}");
+            assert_eq!(has_triad, width > 200.0, "{rect}");
             assert!(rect.contains_rect(Rect::from_center_size(centre, Vec2::splat(2.0 * radius))), "{rect}");
             let scale = vec2(CORNER_SCALE.x, CORNER_SCALE.y);
             let scale = Align2::RIGHT_BOTTOM.align_size_within_rect(scale, rect);
@@ -425,7 +434,7 @@ mod tests {
         }
         // A large picture has the largest circle in its middle.
         let rect = Rect::from_min_size(pos2(0.0, 0.0), vec2(320.0, 320.0));
-        assert_eq!(place_circle(rect, true), Circle { centre: rect.center(), radius: CIRCLE_RADIUS * 320.0 });
+        assert_eq!(place_circle(rect), (Circle { centre: rect.center(), radius: CIRCLE_RADIUS * 320.0 }, true));
     }
 
     #[test]
