@@ -22,6 +22,12 @@ use crate::units::{format_quantity_digits, from_display, to_display};
 const PRESET: &str = "solver.preset";
 /// Parameters shown first.
 pub(super) const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
+/// What a first visit is told of them: no symbols, no laws.
+const FIRST_WORDS: [&str; 3] = [
+    "The gap all round between the ball and the wall of its socket. In a wider gap the ball flies longer and strikes harder.",
+    "How strongly the wall holds back a ball that slides along it. Steel on steel has between 0.1 (oiled) and 0.8 (dry).",
+    "How fast the ball leaves the wall, compared with how fast it came. With 1 an impact loses no energy.",
+];
 
 /// Size of the first parameter of the first visit relative to the others.
 const LARGE: f32 = 1.4;
@@ -48,6 +54,8 @@ pub struct Controls {
     joint: usize,
     /// Key of a joint whose slider is scrolled into view and focused.
     revealed: Option<String>,
+    /// Whether tooltips say only what a first visit is told.
+    plain: bool,
     /// Whether the user asked for a restart, which applies the changes that wait for it.
     asks_restart: bool,
 }
@@ -68,6 +76,8 @@ struct Row<'a> {
     now: Value,
     /// Width of what stands at the right of its name, points.
     room: f32,
+    /// What its tooltip says in place of help, law and range.
+    plain: Option<&'static str>,
 }
 
 impl Row<'_> {
@@ -161,6 +171,7 @@ impl Controls {
     pub fn contact_controls(&mut self, ui: &mut Ui, player: &mut Player) {
         spoken::landmark(ui, "Parameters");
         let (table, fingers) = (player.pending().parameters(), theme::has_fingers(ui));
+        self.plain = true;
         for (place, key) in FIRST.into_iter().enumerate() {
             let Some(parameter) = table.iter().find(|p| p.key == key) else {
                 continue;
@@ -178,6 +189,7 @@ impl Controls {
             });
             ui.add_space(4.0);
         }
+        self.plain = false;
     }
 
     /// The preset, and the accuracy of the running scene.
@@ -243,7 +255,8 @@ impl Controls {
                 Kind::Choice(_) => 168.0,
                 Kind::Count { .. } => 78.0,
             };
-        let row = Row { parameter, key, name, now, room };
+        let plain = self.plain.then(|| FIRST.iter().position(|first| *first == key)).flatten();
+        let row = Row { parameter, key, name, now, room, plain: plain.map(|place| FIRST_WORDS[place]) };
         ui.push_id(key, |ui| match &parameter.kind {
             Kind::Number { .. } => self.number(ui, player, &row),
             Kind::Choice(words) => self.choice(ui, player, &row, words),
@@ -571,7 +584,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
     if is_in_use(ui, response) {
         return;
     }
-    let Row { parameter, key, .. } = row;
+    let Row { parameter, key, plain, .. } = *row;
     const ABOVE: [RectAlign; 1] = [RectAlign::TOP_START];
     let panel = ui.clip_rect().x_range();
     let row = Rect::from_x_y_ranges(panel, response.rect.y_range());
@@ -580,6 +593,10 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
     tooltip.popup = tooltip.popup.anchor(row).align(RectAlign::BOTTOM_START).align_alternatives(&ABOVE);
     tooltip.show(|ui| {
         ui.strong(parameter.label);
+        if let Some(words) = plain {
+            ui.label(words);
+            return;
+        }
         ui.label(value::typeset(parameter.help));
         let shown_law = equations::law(key, player.pending());
         if let Some(shown_law) = &shown_law {

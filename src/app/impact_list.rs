@@ -12,6 +12,7 @@ use super::files::{file_stem, meta};
 use super::host::SaveFile;
 use super::player::Player;
 use super::player::impact_record::RecordedImpact;
+use super::plots::HARDEST_HELP;
 use super::run::Run;
 use super::{spoken, theme, value};
 use crate::analysis::impact_row;
@@ -298,10 +299,12 @@ impl Run {
                     ui.horizontal(|ui| {
                         spoken::heading(&ui.label(RichText::new("Impacts").strong()), "Impacts");
                         let hardest = self.player.impact_record().hardest(self.player.reached());
-                        let help = "To the peak of the impact with the largest normal force so far";
                         let button = ui.add_enabled(hardest.is_some(), Button::new("Hardest impact"));
-                        if button.on_hover_text(help).clicked() {
-                            clicked_time = hardest.map(|(_, own)| own.force_peak.time);
+                        if button.on_hover_text(HARDEST_HELP).clicked()
+                            && let Some((_, own)) = hardest
+                        {
+                            self.plots.show_around(own);
+                            clicked_time = Some(own.force_peak.time);
                         }
                         let help = "All of them, CSV, with the columns of `run --impacts`";
                         save = ui.button("Save impacts…").on_hover_text(help).clicked();

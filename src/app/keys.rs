@@ -157,14 +157,15 @@ pub fn action(key: Key) -> Option<Action> {
 }
 
 /// Mouse and touch gestures for the overlay.
-pub const POINTER: [(&str, &str); 10] = [
+pub const POINTER: [(&str, &str); 11] = [
     ("Drag beside the machine, one finger", "Turn the view"),
     ("Drag on a body; with a finger, hold first", "Pull it by a spring; with shift along the line of sight"),
     ("Right or middle drag, shift-drag, two fingers", "Pan the view"),
     ("Wheel, pinch", "Zoom in on what is under the cursor"),
     ("Hover", "Details of a part"),
-    ("Click, tap on a joint with play", "Centre it and show it under the microscope"),
-    ("Double-click, double tap", "Follow a body or joint; on the ground: stop following"),
+    ("Click, tap on a joint with play or its name", "Centre it and show it under the microscope"),
+    ("Double-click, double tap on it", "Close-up; the view follows it"),
+    ("Double-click, double tap on a body", "Follow it; on the ground: stop following"),
     ("Double-click, double tap on the lowest bar", "Presentation, as F5"),
     ("Drop a file", "Open a scene"),
     ("Paste", "Open a link"),

@@ -76,6 +76,20 @@ pub struct LabelPositions {
     pub(super) own: HashMap<LabelKind, Place>,
     /// Those of the picture beside it, which come first, so that both look alike.
     pub(super) beside: HashMap<LabelKind, Place>,
+    /// Plates of the names of joints with play in the latest picture.
+    plates: Vec<(usize, Rect)>,
+}
+
+impl LabelPositions {
+    /// The joint whose name is at `pos`.
+    pub(super) fn joint_at(&self, pos: Pos2) -> Option<usize> {
+        self.plates.iter().find(|(_, plate)| plate.contains(pos)).map(|(joint, _)| *joint)
+    }
+
+    /// Forgets where names are, in a picture without any.
+    pub(super) fn clear_plates(&mut self) {
+        self.plates.clear();
+    }
 }
 
 /// A label to place.
@@ -134,6 +148,7 @@ pub(super) fn paint(
     places: &mut LabelPositions,
 ) {
     let before = std::mem::take(&mut places.own);
+    places.clear_plates();
     let halo = colour(list.background.bottom);
     for label in list.labels.iter().filter(|label| matches!(label.kind, LabelKind::Axis | LabelKind::Gravity)) {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
@@ -195,6 +210,9 @@ pub(super) fn paint(
             continue;
         };
         places.own.insert(label.kind, place);
+        if let LabelKind::Joint(joint) = label.kind {
+            places.plates.push((joint, plate));
+        }
         occupied.push(plate);
         if let Some(line) = leader(at, plate) {
             leaders.push(line);

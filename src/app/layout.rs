@@ -514,8 +514,12 @@ impl App {
         let strips = viewport.ui(&mut place, &self.run.player, plain, room);
         self.run.follow_names(ui.ctx());
         ui.advance_cursor_after_rect(whole);
-        if let Some(joint) = self.run.viewport.take_clicked() {
-            self.run.focus(joint);
+        if let Some((joint, twice)) = self.run.viewport.take_clicked() {
+            if twice {
+                self.run.perform(Action::CloseUp(joint));
+            } else {
+                self.run.focus(joint);
+            }
             self.run.microscope.set_open(true);
             ui.request_repaint();
         }

@@ -9,7 +9,7 @@ use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, Wid
 use glam::Vec3;
 
 use super::keys::Action;
-use super::paths::Point;
+use super::paths::{Point, of_clearance};
 use super::player::Player;
 use super::run::Run;
 use super::{layout, sound, spoken, theme, value};
@@ -35,6 +35,8 @@ const SECTION_HEIGHT: f32 = 112.0;
 const MIN_SECTION_HEIGHT: f32 = 76.0;
 /// Width from which pictures and numbers are side by side, points.
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 430.0;
+/// Least side of a phone's picture with the choice of the plane in sight below it, points.
+const MIN_SIDE_ABOVE_CHOICE: f32 = 160.0;
 /// Width of the numbers beside the pictures, points.
 const NUMBERS_WIDTH: f32 = 215.0;
 /// Least reference speed of the velocity arrow, m/s.
@@ -147,7 +149,14 @@ impl Microscope {
         } else {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
-                let side = if is_narrow { width.min(space.y) } else { draw::side(vec2(width, space.y), 150.0) };
+                let side = if is_narrow {
+                    // The choice below is shown whole or is scrolled to: a strip of it would look like a mistake.
+                    let choice = ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
+                    let above = space.y - choice;
+                    if above >= MIN_SIDE_ABOVE_CHOICE { width.min(above) } else { space.y }
+                } else {
+                    draw::side(vec2(width, space.y), 150.0)
+                };
                 self.picture(ui, player, &magnified, axes, vec2(width, side));
                 if is_narrow {
                     self.plane_choice(ui);
@@ -180,7 +189,11 @@ impl Microscope {
         }
         let sheet = Sheet::new(ui, rect, magnified);
         let now = player.pacer.shown();
-        let path = |number: usize| player.paths().between(self.joint, number, magnified.since, now);
+        // An older part would leave the present clearance, or never reach it.
+        let path = |number: usize| {
+            let since = player.paths().between(self.joint, number, magnified.since, now);
+            of_clearance(since, magnified.report.clearance)
+        };
         let help = match magnified.kind {
             LooseKind::Pin(kind) if kind.length.is_some() => pin::draw(&sheet, &kind, axes, [0, 1].map(path), now),
             LooseKind::Slide(kind) => slide::draw(&sheet, &kind, path(0), now),
@@ -198,14 +211,14 @@ impl Microscope {
         if magnified.kind == LooseKind::Ball {
             self.circle = Some(draw::sphere(sheet, axes, path, now, speed));
             return "The circle is the clearance; the ball's centre leaves it only by the penetration. The path, seen from \
-                    the socket, covers the latest six impacts and fades with age (recorded for the first 12 joints). In \
-                    contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the ball's \
+                    the socket, covers the latest six impacts since the clearance last changed, and fades with age (recorded for the \
+                    first 12 joints). In contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the ball's \
                     centre, in contact the sliding velocity of the friction law.";
         }
         self.circle = Some(draw::sphere(sheet, pin::across(magnified, axes), path, now, speed));
         "Section across the pin's axis. The circle is the clearance; the middle of the pin leaves it only by the \
-         penetration. The path covers the latest six impacts and fades with age (recorded for the first 12 joints). In \
-         contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the pin's middle."
+         penetration. The path covers the latest six impacts since the clearance last changed, and fades with age \
+         (recorded for the first 12 joints). In contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the pin's middle."
     }
 }
 

@@ -56,6 +56,7 @@ mod pull;
 mod reload;
 #[cfg(not(target_arch = "wasm32"))]
 mod remembered;
+mod ruler;
 mod run;
 #[cfg(not(target_arch = "wasm32"))]
 mod saved;

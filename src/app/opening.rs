@@ -64,8 +64,7 @@ mod tests {
             }
             let first = plots(&scene)[0];
             let is_error = matches!(first, Quantity::ProbeError | Quantity::TipError);
-            // The paper's machine has the plots of the paper.
-            assert_eq!(is_error, scene.machine.output.probe.is_some() && name != "spcmm", "{name}");
+            assert_eq!(is_error, scene.machine.output.probe.is_some(), "{name}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! Overlays painted on a picture: labels, arrow legend, time. Used by the viewport and by headless frames.
 
 use eframe::egui::text::{LayoutJob, TextWrapping};
-use eframe::egui::{Align2, FontId, Painter, Rect, Shape, Stroke, Vec2, pos2, vec2};
+use eframe::egui::{Align2, FontId, Galley, Painter, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
 use super::labels::{self, LabelPositions};
 pub(super) use super::labels::{SMALL_PICTURE, colour, fits_labels, text};
@@ -50,6 +50,8 @@ pub struct Overlay {
     pub legend: bool,
     /// Whether to draw names of joints and axes.
     pub labels: bool,
+    /// Whether the legend of the arrows says that its scale is new.
+    pub has_new_scale: bool,
     /// Room for the caller's own widgets.
     pub room: Room,
 }
@@ -224,13 +226,15 @@ pub fn paint(
         error_scale(painter, strips.scale, scale, theme);
     }
     if let Some(shown) = list.legend.as_ref().filter(|_| overlay.legend && strips.legend.height() >= LEGEND_HEIGHT) {
-        legend(painter, strips.legend, scale, shown, theme);
+        legend(painter, strips.legend, scale, shown, overlay.has_new_scale, theme);
     }
     let whole = scene.union(strips.top).union(strips.bottom);
     time(painter, strips.top, overlay, &all_notes(list, overlay), theme, whole);
     if overlay.labels && fits_labels(whole) {
         let occupied = if list.overlay.is_empty() { Vec::new() } else { vec![triad(scene)] };
         labels::paint(painter, scene, scale, list, occupied, places);
+    } else {
+        places.clear_plates();
     }
 }
 
@@ -297,7 +301,7 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
 }
 
 /// Legend of the arrows at the right end of `place`: names on the left, the axis on the right.
-fn legend(painter: &Painter, place: Rect, scale: f32, legend: &Legend, theme: Theme) {
+fn legend(painter: &Painter, place: Rect, scale: f32, legend: &Legend, is_new: bool, theme: Theme) {
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
     let full = legend.pixels / scale;
@@ -331,10 +335,19 @@ fn legend(painter: &Painter, place: Rect, scale: f32, legend: &Legend, theme: Th
     let broken = [format!("{kind}, broken ones are longer"), format!("{short}, broken: longer")];
     let whole = [kind, short.to_owned()];
     let titles = if legend.clipped { broken } else { whole };
-    let lay = |title: &String| painter.layout_no_wrap(title.clone(), font.clone(), ink);
-    let title = titles.iter().map(lay).find(|words| words.size().x <= reserved + 24.0);
-    if let Some(title) = title {
-        painter.galley(pos2(place.right() - title.size().x, place.top() - 1.0), title, ink);
+    let lay = |title: &String, ink| painter.layout_no_wrap(title.clone(), font.clone(), ink);
+    let at = |words: &Galley| pos2(place.right() - words.size().x, place.top() - 1.0);
+    if is_new {
+        // In the place of the title, and with its colours exchanged.
+        let force = format_quantity_digits(f64::from(legend.reference), "N", 3);
+        let words = lay(&format!("New scale: {force}"), halo);
+        let corner = at(&words) - vec2(4.0, 0.0);
+        painter.rect_filled(Rect::from_min_size(corner, words.size() + vec2(6.0, 1.0)), 3.0, ink);
+        painter.galley(corner + vec2(3.0, 0.0), words, halo);
+    } else if let Some(title) =
+        titles.iter().map(|title| lay(title, ink)).find(|words| words.size().x <= reserved + 24.0)
+    {
+        painter.galley(at(&title), title, ink);
     }
     if !names {
         return;
@@ -576,7 +589,8 @@ mod tests {
                 let options =
                     ViewOptions { wear: if wear { WearMap::Impulse } else { WearMap::Off }, ..ViewOptions::default() };
                 let notes = vec!["following S1".to_owned(), "tip error 123.4 µm".to_owned()];
-                let overlay = Overlay { time: Some(0.0), notes, legend: true, labels: true, room };
+                let overlay =
+                    Overlay { time: Some(0.0), notes, legend: true, labels: true, room, ..Overlay::default() };
                 let strips = strips(whole, &overlay, 3 + usize::from(wear), &options, false);
                 let Strips { top, scene, bottom, words, .. } = strips;
                 assert_eq!(top.union(scene).union(bottom), whole, "{whole}");

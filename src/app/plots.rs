@@ -10,6 +10,7 @@ use egui_plot::{FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint,
 use super::compare::{Comparison, EarlierRun};
 use super::curve::{Curves, Path, Trace};
 use super::player::Player;
+use super::player::impact_record::RecordedImpact;
 use super::stack::stack;
 use super::zoom::{self, Zoom};
 use super::{curve, layout, opening};
@@ -47,6 +48,12 @@ const LETTER_WIDTH: f64 = 7.0;
 const MIN_SWITCH_WIDTH: f32 = 70.0;
 /// Room for the button to the hardest impact in a title, points. Without it, the note on cut peaks leads there.
 const MIN_HARDEST_WIDTH: f32 = 96.0;
+/// Time shown before and after an impact: in its durations, and at least and at most, s.
+const IMPACT_DURATIONS: f64 = 10.0;
+const IMPACT_MARGINS: [f64; 2] = [1e-3, 0.05];
+/// What the button to the hardest impact does.
+pub(super) const HARDEST_HELP: &str = "To the peak of the impact with the largest normal force so far, with a few milliseconds around it \
+                                       in the plots. Double-click on a plot for its whole window";
 /// Fraction of the time range by which an arrow key moves the cursor.
 const KEY_FRACTION: f64 = 0.01;
 /// Approximate maximum number of marks on an axis.
@@ -393,7 +400,7 @@ impl Plots {
     }
 
     /// Time range of the plots, s. It ends at the displayed instant, or up to a quarter of its length later if recorded.
-    fn range(&self, player: &Player) -> (f64, f64) {
+    pub(super) fn range(&self, player: &Player) -> (f64, f64) {
         if let Some(range) = self.zoomed {
             return range;
         }
@@ -404,6 +411,15 @@ impl Plots {
         let end = end.max(known.min(shown + 0.25 * length));
         // A window that would start before t = 0 fills from the left.
         if end < length { (0.0, length) } else { (end - length, end) }
+    }
+
+    /// Shows a few of its durations around `impact`, until a double click on a plot or another window.
+    pub fn show_around(&mut self, impact: &RecordedImpact) {
+        let duration = if impact.end.is_finite() { impact.end - impact.start } else { 0.0 };
+        let [least, most] = IMPACT_MARGINS;
+        let margin = (IMPACT_DURATIONS * duration).clamp(least, most);
+        let peak = impact.force_peak.time;
+        self.zoomed = Some(((peak - margin).max(0.0), peak + margin));
     }
 
     /// Titles of the chosen plots in order.
@@ -798,9 +814,11 @@ impl Plots {
                 let hardest = player.impact_record().hardest(player.reached());
                 let button =
                     ui.add_enabled(hardest.is_some(), egui::Button::new(RichText::new("Hardest impact").small()));
-                let help = "To the peak of the impact with the largest normal force so far";
-                if button.on_hover_text(help).on_disabled_hover_text("No impact so far").clicked() {
-                    asked = hardest.map(|(_, own)| own.force_peak.time);
+                if button.on_hover_text(HARDEST_HELP).on_disabled_hover_text("No impact so far").clicked()
+                    && let Some((_, own)) = hardest
+                {
+                    self.show_around(own);
+                    asked = Some(own.force_peak.time);
                 }
             }
             if panel.kind == PlotKind::FromZero && ui.available_width() > MIN_SWITCH_WIDTH {

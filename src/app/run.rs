@@ -28,6 +28,8 @@ pub struct Run {
     pub microscope: Microscope,
     pub impact_list: ImpactList,
     pub undo: Undo,
+    /// Range of the plots in the latest frame, and the one recorded in detail, s.
+    plotted: [(f64, f64); 2],
 }
 
 impl Run {
@@ -44,6 +46,7 @@ impl Run {
             microscope: Microscope::default(),
             impact_list: ImpactList::default(),
             undo: Undo::default(),
+            plotted: <_>::default(),
             player,
         }
     }
@@ -171,9 +174,24 @@ impl Run {
         if was_seeking && !self.player.is_seeking() {
             self.viewport.restore_marks(&self.player);
         }
-        let moves = self.viewport.advance(&self.player, dt as f32);
+        let moves = self.retrace_plotted() | self.viewport.advance(&self.player, dt as f32);
         let moves = self.advance_earlier_runs(dt as f32) || moves;
         moves || was_seeking || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
+    }
+
+    /// Has the range of the plots recorded in detail once it stands still. Returns whether that is still to be done.
+    fn retrace_plotted(&mut self) -> bool {
+        let range = self.plots.range(&self.player);
+        let [latest, detailed] = &mut self.plotted;
+        let stands = std::mem::replace(latest, range) == range;
+        if self.player.is_playing() || range == *detailed {
+            return false;
+        }
+        if stands {
+            *detailed = range;
+            self.player.retrace_range(range.0, range.1);
+        }
+        !stands
     }
 
     /// Steps between two frames, as [`Player::step_between`].

@@ -414,11 +414,15 @@ fn flag_at(ui: &Ui, scale: &Scale, time: f64, opacity: f32) {
     if !scale.rect.x_range().contains(x) {
         return;
     }
+    flag(ui, pos2(x, scale.rect.top()), scale.rect.bottom(), opacity);
+}
+
+/// A flag at the top `at` of its pole, which ends at the height `low`.
+fn flag(ui: &Ui, at: Pos2, low: f32, opacity: f32) {
     let colour = ui.visuals().warn_fg_color.gamma_multiply(opacity);
-    let (top, low) = (scale.rect.top(), scale.rect.bottom());
     let painter = ui.painter();
-    painter.vline(x, top..=low, Stroke::new(1.0, colour));
-    let points: Vec<Pos2> = vec![pos2(x, top), pos2(x + 8.0, top + 3.5), pos2(x, top + 7.0)];
+    painter.vline(at.x, at.y..=low, Stroke::new(1.0, colour));
+    let points: Vec<Pos2> = vec![at, at + vec2(8.0, 3.5), at + vec2(0.0, 7.0)];
     painter.add(Shape::convex_polygon(points, colour, Stroke::NONE));
 }
 
@@ -460,10 +464,98 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         let words = format!("Contacts before {} are no longer stored", value::time(known));
         ui.label(words);
     }
-    let help = "Click or drag to go to an instant; wheel or pinch to zoom; double-click to show the whole run. Half \
-                colour: sliding; full colour: creeping, too slow for full friction; mark: contact begins, of a pin above at its \
-                end a and below at b, of a block at its walls +y, −y, +z, −z from above; pale: not yet replayed, or abandoned.";
+    rows_of_key(ui);
+    let help = "Of a pin its end a is above and b below, of a block the walls +y, −y, +z, −z from above. Click or drag to go to an \
+                instant; wheel or pinch to zoom; double-click to show the whole run.";
     ui.label(egui::RichText::new(help).small().color(faint(ui)));
+}
+
+/// A sign of the timeline.
+#[derive(Clone, Copy)]
+enum Sign {
+    /// A contact, with this share of the joint's colour.
+    Contact(f32),
+    Onset,
+    Pale,
+    Flag,
+}
+
+/// The signs, in a word and in a sentence.
+const KEY: [(Sign, &str, &str); 5] = [
+    (Sign::Onset, "touches", "A contact begins; while a lane is empty, its ball flies free"),
+    (Sign::Contact(0.5), "slides", "Slides along its wall"),
+    (Sign::Contact(1.0), "creeps", "Creeps: too slow for full friction"),
+    (Sign::Pale, "later", "Not replayed yet, or abandoned"),
+    (Sign::Flag, "change", "A parameter was changed, or a body pulled"),
+];
+/// Size of a sign in the key, points.
+const SIGN_SIZE: egui::Vec2 = vec2(12.0, 9.0);
+/// Least number of signs in the line of the key: those of every run.
+const MIN_KEY: usize = 3;
+/// Gaps in the line of the key: after a sign, and after a word, points.
+const KEY_GAPS: [f32; 2] = [4.0, 10.0];
+
+impl Sign {
+    fn paint(self, ui: &Ui, rect: Rect) {
+        let colour = theme::series(0, ui.visuals().dark_mode);
+        let painter = ui.painter();
+        let pole = Rect::from_center_size(rect.center(), vec2(1.5, rect.height()));
+        let (place, colour) = match self {
+            Self::Contact(share) => (rect, colour.gamma_multiply(share)),
+            Self::Onset => (pole, colour),
+            Self::Pale => (rect, colour.gamma_multiply(0.5 * PALE_OPACITY)),
+            Self::Flag => return flag(ui, rect.center_top() - vec2(4.0, 0.0), rect.bottom(), 1.0),
+        };
+        painter.rect_filled(place, 0.0, colour);
+    }
+}
+
+/// The key in one line, at the right end of `ui`, if there is room.
+pub fn key(ui: &mut Ui) {
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let ink = ui.visuals().weak_text_color();
+    let [after_sign, after_word] = KEY_GAPS;
+    let (mut words, mut width, mut height) = (Vec::new(), -after_word, SIGN_SIZE.y);
+    for (sign, word, _) in KEY {
+        let word = ui.painter().layout_no_wrap(word.to_owned(), font.clone(), ink);
+        let wider = width + after_word + SIGN_SIZE.x + after_sign + word.size().x;
+        if wider > ui.available_width() {
+            break;
+        }
+        (width, height) = (wider, height.max(word.size().y));
+        words.push((sign, word));
+    }
+    if words.len() < MIN_KEY {
+        return;
+    }
+    let (rect, response) = ui.allocate_exact_size(vec2(width, height), Sense::hover());
+    let all = KEY.map(|(_, _, words)| words).join(". ");
+    response
+        .widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Label, true, format!("Key of the timeline. {all}")));
+    let mut x = rect.left();
+    for (sign, word) in words {
+        let place = Rect::from_center_size(pos2(x + 0.5 * SIGN_SIZE.x, rect.center().y), SIGN_SIZE);
+        sign.paint(ui, place);
+        x += SIGN_SIZE.x + after_sign;
+        let at = pos2(x, rect.center().y - 0.5 * word.size().y);
+        x += word.size().x + after_word;
+        ui.painter().galley(at, word, ink);
+    }
+    response.on_hover_ui(|ui| {
+        ui.strong("The lanes of the timeline");
+        ui.label("One lane for each joint with play, in the colours of the plots.");
+        rows_of_key(ui);
+    });
+}
+
+fn rows_of_key(ui: &mut Ui) {
+    for (sign, _, words) in KEY {
+        ui.horizontal(|ui| {
+            let (rect, _) = ui.allocate_exact_size(SIGN_SIZE, Sense::hover());
+            sign.paint(ui, rect);
+            ui.label(egui::RichText::new(words).small());
+        });
+    }
 }
 
 fn faint(ui: &Ui) -> Color32 {

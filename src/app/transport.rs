@@ -7,7 +7,7 @@ use eframe::egui::{
 use super::icons::{Icon, icon_button};
 use super::keys::Action;
 use super::player::Player;
-use super::{keys, spoken, theme, value};
+use super::{keys, spoken, theme, timeline, value};
 use crate::session::pace::{Limit, SCALE_RANGE};
 
 /// Time scales in the list.
@@ -15,6 +15,8 @@ pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
 
 /// Width of the list of time scales, points: fits the longest entry.
 const SCALES_WIDTH: f32 = 94.0;
+/// Width of the buttons for ten times slower and faster in touch size, points.
+const TENS_WIDTH: f32 = 116.0;
 /// Width of the achieved time scale without its limit, points.
 const LIMIT_WIDTH: f32 = 120.0;
 /// Drag distance from one time scale to the next, points.
@@ -51,6 +53,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Action> {
                 ui.add_space(6.0);
                 speed(ui, player, narrow);
                 settled_hint(ui, player);
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), timeline::key);
             }
             asked
         })
@@ -71,6 +74,9 @@ pub fn row(ui: &mut Ui, player: &mut Player, has_limit: bool) -> Option<Action> 
         let asked = buttons(ui, player);
         if ui.available_width() >= SCALES_WIDTH {
             scales(ui, player);
+        }
+        if ui.available_width() >= LIMIT_WIDTH + TENS_WIDTH {
+            tens(ui, player);
         }
         if has_limit && ui.available_width() > LIMIT_WIDTH {
             limit(ui, player);
@@ -199,7 +205,25 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     spoken::value(&response, &value::time_scale(scale).replace(':', " to "));
     response.accessible_name("Time scale");
     scales(ui, player);
+    if !narrow && ui.available_width() >= TENS_WIDTH {
+        tens(ui, player);
+    }
     limit(ui, player);
+}
+
+/// Buttons for a tenth and ten times the time scale.
+fn tens(ui: &mut Ui, player: &mut Player) {
+    let now = player.pacer.scale();
+    for (words, name, scale) in [("÷10", "Ten times slower", now / 10.0), ("×10", "Ten times faster", now * 10.0)] {
+        let possible = (SCALE_RANGE.0 * 0.999..=SCALE_RANGE.1 * 1.001).contains(&scale);
+        let button = ui.add_enabled(possible, egui::Button::new(words));
+        let help = format!("{name}: {}", value::time_scale(scale.clamp(SCALE_RANGE.0, SCALE_RANGE.1)));
+        let button = button.on_hover_text(help).on_disabled_hover_text("At the end of the range of time scales");
+        if button.clicked() {
+            player.pacer.set_scale(scale.clamp(SCALE_RANGE.0, SCALE_RANGE.1));
+        }
+        button.accessible_name(name);
+    }
 }
 
 /// Selection of the time scale: the list, or a drag across it.

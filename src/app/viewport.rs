@@ -14,6 +14,7 @@ use super::overlay::{self, Overlay, Room, Strips};
 use super::pace::{Pace, ShownFrame};
 use super::player::Player;
 use super::pull::Grip;
+use super::ruler::RulerScale;
 use super::{ghosts, keys, opening, spoken, value, zoom};
 use crate::machine::Vec3 as Exact;
 use crate::render;
@@ -101,8 +102,8 @@ pub struct Viewport {
     grip_changed: bool,
     /// Whether there was more than one finger since the last time there was none.
     pinched: bool,
-    /// The clicked joint, until it is taken.
-    clicked: Option<usize>,
+    /// The clicked joint, and whether it was a double click, until it is taken.
+    clicked: Option<(usize, bool)>,
     /// What the latest single click hit.
     tapped: Option<ScenePart>,
     /// Quality control by frame time; `None` always uses the quality of the options.
@@ -114,6 +115,8 @@ pub struct Viewport {
     pub(super) common: Option<f32>,
     /// Reference force of a run under reproduction, or of a film, N.
     run_scale: Option<f32>,
+    /// How the scale of the arrows changes.
+    pub(super) ruler: RulerScale,
     /// Whether only machine and time are shown for lack of room.
     pub(super) bare: bool,
     /// Whether the time is shown elsewhere in the window.
@@ -163,6 +166,7 @@ impl Viewport {
             cloud: None,
             common: None,
             run_scale: None,
+            ruler: RulerScale::default(),
             bare: false,
             hides_time: false,
             scene: Rect::ZERO,
@@ -423,8 +427,8 @@ impl Viewport {
         [right, up]
     }
 
-    /// The joint clicked since the last call.
-    pub fn take_clicked(&mut self) -> Option<usize> {
+    /// The joint clicked since the last call, by its ball or its name, and whether it was a double click.
+    pub fn take_clicked(&mut self) -> Option<(usize, bool)> {
         self.clicked.take()
     }
 
@@ -575,7 +579,11 @@ impl Viewport {
         let pick = |pos: Pos2| self.view.pick(&shot, screen.pixel(pos));
         let hovered = response.hover_pos().filter(|_| !plain && !response.dragged()).and_then(pick);
         // A lifted finger does not hover.
-        let tapped = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(pick).map(|hit| hit.what);
+        // A name is its joint.
+        let named = |pos: Pos2| self.places.joint_at(pos).map(ScenePart::Joint);
+        let what = |pos: Pos2| named(pos).or_else(|| pick(pos).map(|hit| hit.what));
+        let tapped = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(what);
+        let hovered_name = response.hover_pos().filter(|_| !plain && !response.dragged()).and_then(named);
         // The second click of two is for what the first one hit, which may have moved the picture since.
         let tapped = match (response.clicked(), response.double_clicked()) {
             (true, true) => self.tapped.take().or(tapped),
@@ -602,8 +610,11 @@ impl Viewport {
         {
             ui.ctx().set_cursor_icon(egui::CursorIcon::Grab);
         }
+        if hovered_name.is_some() {
+            ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
+        }
         if let Some(ScenePart::Joint(joint)) = tapped {
-            self.clicked = Some(joint);
+            self.clicked = Some((joint, response.double_clicked()));
         } else if response.double_clicked() {
             self.follow(tapped);
         }
@@ -614,16 +625,24 @@ impl Viewport {
         // Scale of the drawn picture, which may have fewer pixels than the screen.
         let Screen { scale, .. } = screen.with_quality(self.list.quality);
         let theme = self.options.theme;
+        if self.frozen.is_none() {
+            // Before the first force there is no scale.
+            let is_known = self.marks.largest() > 0.0 || self.options.arrows.reference.is_some();
+            let reference = self.list.legend.as_ref().filter(|_| is_known).map(|legend| legend.reference);
+            if let Some(left) = self.ruler.show(reference, ui.input(|input| input.time)) {
+                ui.ctx().request_repaint_after(Duration::from_secs_f64(left));
+            }
+        }
         let overlay = self.overlay(player, ghost_notes, room, self.hides_time);
         let strip_painter = ui.painter_at(whole);
         overlay::paint(&strip_painter, &strips, scale, &self.list, theme, &overlay, &mut self.places);
-        if let Some(hit) = hovered {
+        if let Some(what) = hovered_name.or(hovered.map(|hit| hit.what)) {
             // Placed away from the nearer edge, so that the transport below stays free.
             let low = response.hover_pos().is_some_and(|pos| pos.y > rect.center().y);
             let align = if low { RectAlign::TOP_START } else { RectAlign::BOTTOM_START };
             let mut card = Tooltip::for_enabled(&response).at_pointer().gap(12.0);
             card.popup = card.popup.align(align);
-            card.show(|ui| describe(ui, player, hit.what));
+            card.show(|ui| describe(ui, player, what));
         }
         self.options.triad = triad;
         strips
@@ -653,6 +672,7 @@ impl Viewport {
             notes: self.title.clone().into_iter().chain(following).chain(ghost_notes).collect(),
             legend: !self.bare,
             labels: !self.bare,
+            has_new_scale: self.frozen.is_none() && self.ruler.is_new(),
             room,
         }
     }
@@ -690,7 +710,8 @@ impl Viewport {
         let mut list = std::mem::take(&mut self.next);
         let reduced_screen = screen.with_quality(quality);
         let own_reference = self.options.arrows.reference;
-        self.options.arrows.reference = own_reference.or(self.common).or(self.run_scale);
+        let automatic = || Some(self.ruler.follow(self.marks.reference(&self.options.arrows)));
+        self.options.arrows.reference = own_reference.or(self.common).or(self.run_scale).or_else(automatic);
         let shot = shot!(self, player, camera, reduced_screen);
         self.view.build(&shot, &mut list);
         list.quality = quality;
@@ -1099,7 +1120,11 @@ fn describe(ui: &mut Ui, player: &Player, picked: ScenePart) {
         }
         ScenePart::Fixed(_) => {}
     }
-    ui.label(RichText::new("Double-click to follow").small().weak());
+    let gestures = match picked {
+        ScenePart::Joint(_) => "Click for the microscope, double-click for a close-up",
+        ScenePart::Body(_) | ScenePart::Fixed(_) => "Double-click to follow",
+    };
+    ui.label(RichText::new(gestures).small().weak());
 }
 
 #[cfg(test)]

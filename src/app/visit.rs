@@ -40,6 +40,7 @@ impl App {
         let options = &mut self.run.viewport.options;
         (options.joint_names, options.triad) = (false, false);
         self.run.viewport.begin_close_up(&self.run.player, JOINT);
+        self.run.viewport.ruler.only_grows(true);
         if self.calm {
             self.run.player.go_to_impact(Some(JOINT), true);
         }
@@ -57,6 +58,7 @@ impl App {
         let usual = crate::view::ViewOptions::default();
         let options = &mut self.run.viewport.options;
         (options.joint_names, options.triad) = (usual.joint_names, usual.triad);
+        self.run.viewport.ruler.only_grows(false);
         true
     }
 
@@ -179,8 +181,9 @@ impl App {
         ui.label(if self.calm && !player.is_playing() {
             "It stands still, because your system asks for reduced motion. Play moves it.".to_owned()
         } else {
-            let listen = if self.sound.is_on() { ", watch the ball and listen" } else { " and watch the ball" };
-            format!("Slowed down {scale} times. Move a slider{listen}.")
+            // As long with sound as without, so that the switch moves nothing.
+            let listen = if self.sound.is_on() { "Listen to its impacts." } else { "Turn on Sound to hear it." };
+            format!("Slowed down {scale} times. Move a slider and watch the ball. {listen}")
         });
         let gap = if self.panels.is_compact() { 0.0 } else { 8.0 };
         ui.add_space(gap);

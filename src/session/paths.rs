@@ -18,6 +18,8 @@ pub struct Point {
     /// Position from where the point is without play, of a block from the middle of its guide, in the axes of the carrier's body, m:
     /// the path turns with the socket.
     pub position: [f32; 3],
+    /// The joint's clearance then, m.
+    pub clearance: f32,
 }
 
 /// The latest paths of the first [`RECORDED_JOINTS`] joints with play.
@@ -99,7 +101,7 @@ impl Paths {
                     // Half at once: shifting all points for each new one would be too costly.
                     points.drain(..MAX_POINTS / 2);
                 }
-                points.push(Point { time: frame.time, position });
+                points.push(Point { time: frame.time, position, clearance: report.clearance as f32 });
             }
         }
     }
@@ -113,6 +115,12 @@ impl Paths {
         let end = points.partition_point(|point| point.time <= to);
         &points[start..end.max(start)]
     }
+}
+
+/// The end of `path` since the clearance was last another one than `clearance`, m.
+pub fn of_clearance(path: &[Point], clearance: f64) -> &[Point] {
+    let before = path.iter().rposition(|point| point.clearance != clearance as f32);
+    &path[before.map_or(0, |last| last + 1)..]
 }
 
 #[cfg(test)]
@@ -223,5 +231,22 @@ mod tests {
         let along = |point: &Point| axes.column(0).dot(&Vec3::from(point.position.map(f64::from)));
         let [low, high] = [f64::min, f64::max].map(|of| points.iter().map(along).reduce(of).expect("points"));
         assert!(high - low > 10.0 * report.clearance, "{low} to {high}");
+    }
+
+    #[test]
+    fn after_the_clearance_has_shrunk_the_path_stays_within_it() {
+        let mut player = player("spcmm");
+        player.run_to(20e-3);
+        player.set("contact.clearance", "0.1 mm").expect("in range");
+        player.run_to(180e-3);
+        let clearance = player.frame().joints[0].clearance;
+        assert!((clearance - 0.1e-3).abs() < 1e-12, "it has arrived: {clearance}");
+        let all = player.paths().between(0, 0, ALL.0, ALL.1);
+        let distance = |point: &Point| point.position.iter().map(|x| x * x).sum::<f32>().sqrt();
+        assert!(all.iter().any(|point| distance(point) > 0.2e-3), "earlier it was farther out");
+        let now = of_clearance(all, clearance);
+        assert!(now.len() > 20, "{}", now.len());
+        assert!(now.iter().all(|point| distance(point) < 1.05 * clearance as f32));
+        assert!(of_clearance(all, 0.2e-3).is_empty());
     }
 }

@@ -181,9 +181,9 @@ impl Palette {
             ball: material(if dark { 0xE3E7EB } else { 0xD8DCE0 }, 0.22, 0.75),
             socket: if dark { glass(0x8CC4F0, 0.17) } else { glass(0x6FA8DC, 0.20) },
             ghosts: if dark {
-                [twin(0xC9A0FF, 0.85, 0xE0C3FF), ideal(0xFFFFFF, 0.5, 0xFFFFFF)]
+                [twin(0xC9A0FF, 0.85, 0xE0C3FF), ideal(0xFFFFFF, 0.16, 0xFFFFFF)]
             } else {
-                [twin(0x7B2FBE, 0.85, 0x5A189A), ideal(0xFFFFFF, 0.9, 0x2F4858)]
+                [twin(0x7B2FBE, 0.85, 0x5A189A), ideal(0xFFFFFF, 0.3, 0x2F4858)]
             },
             exposure: if dark { 1.2 } else { 1.0 },
             studio: if dark { [1.0, 0.3, 0.62, 2.2] } else { [1.0, 0.42, 0.95, 2.2] },
@@ -193,7 +193,7 @@ impl Palette {
         }
     }
 
-    /// How a ghost is drawn: the twin violet, the ideal pale.
+    /// How a ghost is drawn: the twin violet, the ideal little more than its outline, since it lies on the machine.
     pub const fn ghost(&self, which: Ghost) -> GhostLook {
         self.ghosts[which as usize]
     }

@@ -177,7 +177,7 @@ const CLAIMS: &[Claim] = &[
     ("first-impact", 1, Begins, "with every ball at the centre of its socket", |s| {
         s.joints().all(|joint| s.joint(joint).eccentricity.norm() < 1e-9)
     }),
-    ("first-impact", 1, Begins, "runs it to the peak of the first impact", |s| {
+    ("first-impact", 1, Begins, "it runs the machine to the peak of the first impact", |s| {
         s.after_keys(&[Key::Period], |s| is_at_peak(s, 1, 0))
     }),
     ("first-impact", 1, Ends, "the first impact of S1 begins at", |s| s.touches(0) && s.plots(&["Normal force, N"])),

@@ -112,7 +112,7 @@ fn the_window_for_the_class_shows_the_same_instant_in_large_type_and_closes_with
         let event = |pressed| egui::Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
         AUDIENCE.with_borrow_mut(|audience| audience.events.extend([true, false].map(event)));
     };
-    for (title, other) in [("Normal force, N", "Eccentricity, mm"), ("Eccentricity, mm", "Normal force, N")] {
+    for (title, other) in [("Tip error by axis, mm", "Normal force, N"), ("Normal force, N", "Tip error by axis, mm")] {
         press(Key::P);
         harness.run_steps(3);
         AUDIENCE.with_borrow(|audience| {
@@ -122,7 +122,7 @@ fn the_window_for_the_class_shows_the_same_instant_in_large_type_and_closes_with
     }
     press(Key::P);
     harness.run_steps(3);
-    AUDIENCE.with_borrow(|audience| assert!(!audience.has("Eccentricity")));
+    AUDIENCE.with_borrow(|audience| assert!(!audience.has("Normal force, N")));
     press(Key::Comma);
     harness.run_steps(3);
     assert!(shown(&harness) < 30e-3);

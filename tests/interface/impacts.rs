@@ -4,7 +4,7 @@ use eframe::egui::{self, Key};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use jointplay::app::{App, AppOptions};
 use jointplay::scene::Scene;
-use jointplay::simulate::Impact;
+use jointplay::simulate::{Impact, Quantity};
 
 use crate::hands::page::open;
 use crate::hands::peaks_of_run;
@@ -178,6 +178,71 @@ fn the_hardest_impact_is_one_click_away() {
 }
 
 #[test]
+fn the_hardest_impact_comes_with_the_plots_around_it_and_a_double_click_leads_back() {
+    let mut harness = sized("spcmm", [1600.0, 1000.0], egui::Theme::Light);
+    harness.state_mut().player_mut().run_to(60e-3);
+    harness.run();
+    let x = |harness: &mut egui_kittest::Harness<'_, App>, time: f64| {
+        let place = harness.state_mut().plots_mut().place(Quantity::NormalForce, time, 300.0);
+        place.expect("a plot of the normal force")
+    };
+    let apart =
+        |harness: &mut egui_kittest::Harness<'_, App>, time: f64| x(harness, time + 0.5e-3).x - x(harness, time).x;
+    let peaks = peaks_of_run(harness.state(), 60e-3);
+    let (impact, peak) = peaks.iter().max_by(|a, b| a.0.peak.total_cmp(&b.0.peak)).expect("impacts");
+    let (peak, lasts) = (*peak, impact.end - impact.start);
+    let before = apart(&mut harness, peak);
+    click(&mut harness, "Hardest impact");
+    assert_eq!(shown(&harness), peak);
+    let plot = harness.get_by_label("Plot of Normal force").rect();
+    let at = x(&mut harness, peak);
+    assert!((at.x - plot.center().x).abs() < 0.1 * plot.width(), "{at} in {plot}");
+    // The whole impact is in it, and wide enough to have a shape.
+    let [left, right] = [peak - lasts, peak + lasts].map(|time| x(&mut harness, time).x);
+    assert!(plot.left() < left && right < plot.right(), "{left} to {right} in {plot}");
+    assert!(apart(&mut harness, peak) > 5.0 * before);
+    harness.run_steps(60);
+    harness.hover_at(at);
+    harness.step();
+    for _ in 0..2 {
+        harness.drag_at(at);
+        harness.step();
+        harness.drop_at(at);
+        harness.step();
+    }
+    harness.run();
+    let after = apart(&mut harness, peak);
+    assert!((after - before).abs() < 0.1 * before, "{after} {before}");
+}
+
+#[test]
+fn plots_that_stand_still_in_the_past_are_fine_at_every_pace() {
+    let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    // A run so long that only its end is kept in detail.
+    harness.state_mut().player_mut().run_to(2.0);
+    harness.run();
+    harness.state_mut().show_instant(50e-3);
+    harness.run();
+    let instant = (shown(&harness), harness.state().player().simulation().state_hash());
+    for (button, length) in [("Ten times slower", 10e-3), ("Ten times slower", 1e-3), ("Ten times faster", 10e-3)] {
+        click(&mut harness, button);
+        harness.run();
+        let player = harness.state().player();
+        assert!((player.automatic_window() / length - 1.0).abs() < 1e-9, "{}", player.automatic_window());
+        // The plots show a quarter of their window after the instant.
+        let range = [50e-3 - 0.75 * length, 50e-3 + 0.25 * length];
+        let mut bins = Vec::new();
+        let channel = player.channels().normal_force(0).expect("recorded");
+        player.bins(channel, range[0], range[1], 2000, &mut bins);
+        let inside = bins.iter().filter(|bin| bin.from >= range[0] && bin.to <= range[1]);
+        let widest = inside.map(|bin| bin.to - bin.from).fold(0.0, f64::max);
+        assert!(widest > 0.0 && widest <= (length / 400.0).max(2.1e-6), "{button}: {widest} of {length}");
+        assert!(bins.last().is_some_and(|bin| bin.to >= range[1] - length / 100.0), "{button}: up to the end");
+        assert_eq!((shown(&harness), player.simulation().state_hash()), instant, "{button}");
+    }
+}
+
+#[test]
 fn a_cut_peak_leads_to_its_instant() {
     let mut harness = sized("hexapod", [1280.0, 800.0], egui::Theme::Light);
     harness.state_mut().player_mut().run_to(0.2);
@@ -264,6 +329,7 @@ fn the_displayed_plots_are_saved_as_svg_and_png() {
     let scene = Scene::load("spcmm", &[]).expect("built in");
     let options = AppOptions { playing: false, ..AppOptions::new(scene) };
     let (mut harness, calls) = open(options, [1280.0, 800.0]);
+    harness.state_mut().plots_mut().chosen = vec![Quantity::NormalForce, Quantity::Eccentricity];
     harness.state_mut().player_mut().run_to(20e-3);
     harness.run();
     for format in ["Plots as SVG", "Plots as PNG"] {

@@ -692,6 +692,7 @@ fn tasks_of_a_lecture_take_at_most_three_touch_gestures_on_a_phone() {
 
     // 7
     class.harness.state_mut().player_mut().run_to(30e-3);
+    class.harness.state_mut().plots_mut().chosen = vec![Quantity::NormalForce, Quantity::Eccentricity];
     class.tap(Role::Button, "Plots");
     let width = |class: &mut Lecture| {
         let plots = class.harness.state_mut().plots_mut();

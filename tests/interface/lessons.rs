@@ -366,3 +366,19 @@ fn a_presented_lesson_shows_the_whole_microscope_and_its_caption_clears_the_ball
         assert!(caption.distance_to_pos(ball) > 10.0, "{caption:?} {ball:?}");
     }
 }
+
+#[test]
+fn a_lesson_on_a_phone_shows_the_controls_of_the_microscope_whole_or_not_at_all() {
+    for (name, _) in BUILT_IN_LESSONS {
+        let mut harness = open_lesson(name, 0, PHONE);
+        harness.run_steps(3);
+        if !harness.state_mut().microscope_mut().is_open() {
+            continue;
+        }
+        let below = harness.get_by_role_and_label(Role::Slider, "Timeline, s").rect().top();
+        let choice = harness.query_by_role_and_label(Role::ComboBox, "Plane of the microscope");
+        if let Some(place) = choice.map(|choice| choice.rect()) {
+            assert!(place.bottom() < below || place.top() > below - 8.0, "{name}: {place} above {below}");
+        }
+    }
+}

@@ -293,7 +293,7 @@ fn a_double_tap_follows_what_it_hits() {
     }
     harness.run_steps(3);
     // The link carries the followed body and the camera.
-    harness.state_mut().plots_mut().chosen.push(Quantity::Energy);
+    harness.state_mut().plots_mut().chosen = vec![Quantity::NormalForce, Quantity::Eccentricity, Quantity::Energy];
     harness.state_mut().plots_mut().window = PlotWindow::Last(0.01);
     harness.state_mut().microscope_mut().set_open(true);
     harness.state_mut().microscope_mut().focus(1);

@@ -122,7 +122,7 @@ fn a_presentation_scrubs_steps_between_impacts_and_shows_one_plot_at_a_time() {
         click(&mut harness, "Step");
         assert!(shown(&harness) > before);
 
-        let titles = ["Normal force, N", "Eccentricity, mm"];
+        let titles = ["Tip error by axis, mm", "Normal force, N"];
         let shown_plots = |harness: &Harness<'_, App>| titles.map(|title| harness.query_by_label(title).is_some());
         assert_eq!(shown_plots(&harness), [false, false]);
         for expected in [[true, false], [false, true], [false, false]] {

@@ -55,6 +55,7 @@ fn read_tooltip(
 #[test]
 fn tooltips_have_the_values_of_the_run() {
     let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    harness.state_mut().plots_mut().chosen = vec![Quantity::NormalForce, Quantity::Eccentricity];
     harness.state_mut().player_mut().pacer.set_scale(1e-3);
     harness.state_mut().player_mut().run_to(8.5e-3);
     harness.run();

@@ -194,6 +194,104 @@ fn a_slider_of_the_visit_changes_the_sentence_and_the_ball_and_sound_begins_with
     assert_eq!(asked.borrow().sound, [true, false]);
 }
 
+/// Turns the sound on or off by its switch.
+fn switch_sound(harness: &mut Harness<'_, App>) {
+    harness.get_by_role_and_label(Role::CheckBox, "Sound").click();
+    harness.run_steps(3);
+}
+
+#[test]
+fn a_silent_visit_says_how_to_hear_it_and_the_switch_moves_nothing() {
+    for size in [LARGE, PHONE, [1920.0, 1080.0], [1024.0, 700.0]] {
+        let (mut harness, _) = visit(size);
+        let places = |harness: &Harness<'_, App>| {
+            let sliders = ["Clearance", "Friction coefficient", "Restitution"]
+                .map(|slider| harness.get_by_role_and_label(Role::Slider, slider).rect());
+            let ways = WAYS.map(|way| harness.get_by_role_and_label(Role::Button, way).rect());
+            (sliders, ways)
+        };
+        let silent = places(&harness);
+        assert!(page::label(&harness, "Turn on Sound to hear it."), "{size:?}");
+        // The first gesture of a visit switches it on.
+        harness.key_press(Key::F12);
+        harness.run_steps(3);
+        assert!(!page::label(&harness, "Turn on Sound to hear it."), "{size:?}");
+        assert_eq!(places(&harness), silent, "{size:?}");
+        switch_sound(&mut harness);
+        assert!(page::label(&harness, "Turn on Sound to hear it."), "{size:?}");
+        assert_eq!(places(&harness), silent, "{size:?}");
+    }
+}
+
+#[test]
+fn the_tooltips_of_the_visit_have_no_equations_and_those_of_the_window_do() {
+    let told = |harness: &mut Harness<'_, App>, slider: &str| {
+        let at = harness.get_by_role_and_label(Role::Slider, slider).rect().center();
+        harness.hover_at(at + egui::vec2(3.0, 0.0));
+        harness.run_steps(60);
+        let all = Rect::from_min_size(Pos2::ZERO, LARGE.into());
+        let words: Vec<String> = texts(harness, all).into_iter().map(|(text, _)| text).collect();
+        harness.hover_at(Pos2::ZERO);
+        harness.run_steps(10);
+        words
+    };
+    let refers = |words: &[String]| words.iter().any(|text| text.contains("eq. ") || text.contains("eqs. "));
+    let (mut harness, _) = visit(LARGE);
+    for (slider, words) in [
+        ("Clearance", "flies longer and strikes harder"),
+        ("Friction coefficient", "holds back a ball"),
+        ("Restitution", "loses no energy"),
+    ] {
+        let words_shown = told(&mut harness, slider);
+        assert!(words_shown.iter().any(|text| text.replace('\n', " ").contains(words)), "{slider}: {words_shown:?}");
+        assert!(!refers(&words_shown), "{slider}: {words_shown:?}");
+    }
+    press(&mut harness, "The whole machine");
+    harness.key_press(Key::Space);
+    harness.run_steps(90);
+    let words = told(&mut harness, "Restitution");
+    assert!(refers(&words), "{words:?}");
+}
+
+/// The force that the ruler says its scale has come to, N.
+fn new_scale(harness: &Harness<'_, App>) -> Option<f64> {
+    let all = Rect::from_min_size(Pos2::ZERO, LARGE.into());
+    let words =
+        texts(harness, all).into_iter().find_map(|(text, _)| Some(text.strip_prefix("New scale: ")?.to_owned()))?;
+    Some(words.strip_suffix(" N").expect("in newtons").replace('\u{202f}', "").parse().expect("a number"))
+}
+
+#[test]
+fn the_ruler_of_the_visit_only_grows_and_every_new_scale_is_told_for_two_seconds() {
+    let (mut harness, _) = visit(LARGE);
+    let mut told: Vec<(f64, usize)> = Vec::new();
+    for _ in 0..1200 {
+        harness.step();
+        match (new_scale(&harness), told.last_mut()) {
+            (Some(scale), Some((last, frames))) if *last == scale => *frames += 1,
+            (Some(scale), _) => told.push((scale, 1)),
+            (None, _) => {}
+        }
+    }
+    // Twenty seconds, at the end of which the balls rest with a fiftieth of the first forces.
+    assert!(!told.is_empty() && told.is_sorted_by(|a, b| a.0 < b.0), "{told:?}");
+    assert!(told.iter().all(|(_, frames)| *frames <= 121), "{told:?}");
+    let rests = harness.state().player().frame().joints.iter().map(|joint| joint.normal_force.norm());
+    assert!(rests.fold(0.0, f64::max) < 0.1 * told[told.len() - 1].0, "a scale that follows would have fallen");
+    // The whole machine's follows the forces again, and says so.
+    press(&mut harness, "The whole machine");
+    let mut falls = false;
+    let mut last = told[told.len() - 1].0;
+    for _ in 0..1200 {
+        harness.step();
+        if let Some(scale) = new_scale(&harness) {
+            falls |= scale < last;
+            last = scale;
+        }
+    }
+    assert!(falls);
+}
+
 #[test]
 fn the_three_ways_on_lead_to_the_machine_a_lesson_and_the_list_of_machines() {
     let (mut harness, _) = visit(LARGE);

@@ -817,6 +817,52 @@ fn hovering_names_a_part_and_a_double_click_follows_it() {
 }
 
 #[test]
+fn a_double_click_on_a_ball_or_its_name_is_a_close_up() {
+    for on_name in [false, true] {
+        let mut harness = window("spcmm");
+        harness.run_steps(5);
+        let at = if on_name { name_of_joint(&harness, "S2") } else { ball_of_joint(&harness, 1) };
+        let far = harness.state().camera_pose().expect("a camera").distance;
+        harness.hover_at(at);
+        harness.run_steps(60);
+        harness.get_by_label("Click for the microscope, double-click for a close-up");
+        for _ in 0..2 {
+            harness.drag_at(at);
+            harness.drop_at(at);
+            harness.step();
+        }
+        harness.remove_cursor();
+        harness.run_steps(60);
+        let near = harness.state().camera_pose().expect("a camera").distance;
+        assert!(near < 0.5 * far, "{on_name}: {near} of {far}");
+        assert!(harness.state().share_state().contains("follow=joint.S2"), "{}", harness.state().share_state());
+        harness.get_by_label("Microscope");
+    }
+}
+
+/// Where the name of a joint stands in the picture.
+fn name_of_joint(harness: &Harness<'_, App>, name: &str) -> egui::Pos2 {
+    fn find(shape: &egui::Shape, name: &str, inside: egui::Rect) -> Option<egui::Pos2> {
+        match shape {
+            egui::Shape::Vec(shapes) => shapes.iter().find_map(|shape| find(shape, name, inside)),
+            egui::Shape::Text(text) if text.galley.text() == name => {
+                Some(text.visual_bounding_rect().center()).filter(|at| inside.contains(*at))
+            }
+            _ => None,
+        }
+    }
+    let picture = harness.get_by_label("3D view").rect();
+    let shapes = &harness.output().shapes;
+    shapes.iter().find_map(|part| find(&part.shape, name, picture)).expect("a name in the picture")
+}
+
+/// Where the ball of a joint is in the picture.
+fn ball_of_joint(harness: &Harness<'_, App>, joint: usize) -> egui::Pos2 {
+    let app = harness.state();
+    app.place_in_view(&app.player().frame().joints[joint].ball_centre).expect("before the camera")
+}
+
+#[test]
 fn the_chosen_plots_are_shown_with_their_units() {
     let mut harness = window("spcmm");
     harness.get_by_label("Normal force, N");
@@ -1022,6 +1068,7 @@ fn a_low_plot_keeps_its_numbers() {
             // A low window shows the plots in a sheet.
             harness.key_press(Key::P);
         }
+        harness.state_mut().plots_mut().chosen = vec![Quantity::NormalForce, Quantity::Eccentricity];
         harness.state_mut().player_mut().run_to(9e-3);
         harness.run();
         let plots = harness.state_mut().plots_mut();
@@ -1044,6 +1091,7 @@ fn a_low_plot_keeps_its_numbers() {
 #[test]
 fn the_clearance_of_the_past_stays_where_it_was() {
     let mut harness = window("spcmm");
+    harness.state_mut().plots_mut().chosen = vec![Quantity::NormalForce, Quantity::Eccentricity];
     let player = harness.state_mut().player_mut();
     player.run_to(0.02);
     player.set("contact.clearance", "0.6 mm").expect("in range");

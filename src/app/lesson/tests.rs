@@ -45,6 +45,25 @@ fn written_number(text: &str) -> Option<&str> {
     None
 }
 
+/// Controls of every window, without a ring: the largest button, and that of the lesson's panel.
+const ALWAYS_SHOWN: [&str; 2] = ["Play", "Next"];
+
+#[test]
+fn the_first_step_of_every_lesson_names_a_control_and_names_what_it_rings() {
+    for (name, _) in BUILT_IN_LESSONS {
+        let lesson = Lesson::built_in(name).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let step = &lesson.steps[0];
+        let blocks = text::blocks(&step.text);
+        let strong = |piece: &&text::TextSpan| piece.face == text::SpanStyle::Strong;
+        let spans = blocks.iter().flat_map(|block| block.pieces.iter().filter(strong));
+        let named: Vec<&str> = spans.map(|piece| &*piece.text).collect();
+        // `claims.rs` checks that the ringed controls exist.
+        let is_control = |label: &&str| ALWAYS_SHOWN.contains(label) || step.highlight.iter().any(|own| own == label);
+        assert!(named.iter().any(is_control), "{name}: {named:?}");
+        assert!(step.text.contains("ress **") || step.text.contains("rag **"), "{name} says what to do");
+    }
+}
+
 #[test]
 fn every_built_in_lesson_is_correct() {
     let mut names = std::collections::BTreeSet::new();

@@ -184,9 +184,8 @@ pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
         return Err(format!("not in that unit; allowed: {}", known.join(", ")));
     };
     let number = match value / size {
-        extreme if unit.is_empty() && extreme != 0.0 && !(1e-3..1e6).contains(&extreme.abs()) => {
-            value::power_of_ten(extreme)
-        }
+        large if unit.is_empty() && large.abs() >= 1e6 => in_words(large),
+        extreme if unit.is_empty() && extreme != 0.0 && extreme.abs() < 1e-3 => value::power_of_ten(extreme),
         number => value::number(number, DIGITS),
     };
     Ok(match *unit {
@@ -194,6 +193,19 @@ pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
         "°" => number + "°",
         unit => value::typeset(&format!("{number} {unit}")),
     })
+}
+
+/// A number of a million or more, to one digit: `100 million`; a power of ten where no word is common.
+fn in_words(number: f64) -> String {
+    const WORDS: [(f64, &str); 2] = [(1e9, "billion"), (1e6, "million")];
+    // To one digit, of which 999 million has four.
+    let power = libm::pow(10.0, libm::log10(number.abs()).floor());
+    let rounded = (number / power).round() * power;
+    let word = WORDS.into_iter().find(|(size, _)| rounded.abs() * 1.000_001 >= *size).filter(|_| rounded.abs() < 1e12);
+    match word {
+        Some((size, word)) => format!("{}\u{a0}{word}", value::number(rounded / size, DIGITS)),
+        None => value::power_of_ten(number),
+    }
 }
 
 #[cfg(test)]
@@ -251,7 +263,12 @@ mod tests {
             (870.58, Dimension::Force, None, "871 N"),
             (15f64.to_radians(), Dimension::Angle, None, "15°"),
             (1e-9, Dimension::None, None, "1e-9"),
-            (3.97e7, Dimension::None, None, "4e7"),
+            (3.97e7, Dimension::None, None, "40\u{a0}million"),
+            (1.07e8, Dimension::None, None, "100\u{a0}million"),
+            (9.7e8, Dimension::None, None, "1\u{a0}billion"),
+            (-2.2e6, Dimension::None, None, "-2\u{a0}million"),
+            (3.2e12, Dimension::None, None, "3e12"),
+            (999_400.0, Dimension::None, None, "999000"),
             (0.0, Dimension::Force, None, "0 N"),
             (0.15, Dimension::None, None, "0.15"),
         ] {

@@ -16,9 +16,22 @@ const CIRCLE_RADIUS: f32 = 0.39;
 const CENTRE_RADIUS: f32 = 4.5;
 /// Length of the arrow at the reference speed, points.
 const ARROW_LENGTH: f32 = 40.0;
-/// Width and height of the words in the left corners of the sphere's picture, and room beside it for the scale, points.
-const CORNER_TEXT: [f32; 2] = [86.0, 40.0];
-const SCALE_WIDTH: f32 = 34.0;
+/// Width and height of the words in the upper left corner of the sphere's picture, of the axes in the lower left, and height and least
+/// width of the scale in the lower right, points.
+const CORNER_TEXT: Vec2 = vec2(90.0, 40.0);
+const CORNER_TRIAD: Vec2 = vec2(68.0, 58.0);
+const CORNER_SCALE: Vec2 = vec2(54.0, 30.0);
+/// Largest length of the scale, in clearances.
+const LARGEST_BAR: f64 = 0.9;
+/// Height of the words in a picture without axes, all in one line, points.
+const WORDS_LINE: f32 = 19.0;
+/// Least radius of the circle beside the axes, as a fraction of the picture's side; otherwise they are left out.
+const MIN_RADIUS_BESIDE_TRIAD: f32 = 0.34;
+/// Distance between the circle and the words, and between the places that are tried, points.
+const CORNER_GAP: f32 = 4.0;
+/// Steps of the radius, and the least one, as fractions of the picture's side.
+const RADIUS_STEP: f32 = 0.02;
+const MIN_CIRCLE_RADIUS: f32 = 0.21;
 /// Path points closer than this on the screen are merged, points.
 const MIN_DISTANCE: f32 = 0.8;
 /// Least scale of the section, m; typical penetrations are some micrometres.
@@ -155,18 +168,53 @@ pub struct Circle {
     pub radius: f32,
 }
 
+/// Size of the words in the upper left corner.
+fn corner_text(rect: Rect, has_triad: bool) -> Vec2 {
+    if has_triad { CORNER_TEXT } else { vec2(rect.width(), WORDS_LINE) }
+}
+
+/// The place of the circle, and whether the axes have room beside it.
+fn place_circle(rect: Rect) -> (Circle, bool) {
+    let beside = largest_circle(rect, true);
+    let has_triad = beside.radius >= MIN_RADIUS_BESIDE_TRIAD * rect.size().min_elem();
+    if has_triad { (beside, true) } else { (largest_circle(rect, false), false) }
+}
+
+/// The largest circle, and of these the one nearest to the middle of `rect`, that no words in its corners cross.
+fn largest_circle(rect: Rect, has_triad: bool) -> Circle {
+    let side = rect.size().min_elem();
+    let steps = ((CIRCLE_RADIUS - MIN_CIRCLE_RADIUS) / RADIUS_STEP).round() as usize;
+    let radii = (0..=steps).map(|step| side * (CIRCLE_RADIUS - RADIUS_STEP * step as f32));
+    let least = Circle { centre: rect.center(), radius: MIN_CIRCLE_RADIUS * side };
+    let placed = radii.filter_map(|radius| {
+        let scale = vec2(CORNER_SCALE.x.max(LARGEST_BAR as f32 * radius + 14.0), CORNER_SCALE.y);
+        let triad = Align2::LEFT_BOTTOM.align_size_within_rect(CORNER_TRIAD, rect);
+        let words = [
+            Align2::LEFT_TOP.align_size_within_rect(corner_text(rect, has_triad), rect),
+            Align2::RIGHT_BOTTOM.align_size_within_rect(scale, rect),
+        ];
+        let words: Vec<Rect> = words.into_iter().chain(has_triad.then_some(triad)).collect();
+        let inside = rect.shrink(radius + CORNER_GAP);
+        let is_clear = |centre: &Pos2| words.iter().all(|own| own.distance_to_pos(*centre) >= radius + CORNER_GAP);
+        let tried = |half: f32| {
+            let count = (half.max(0.0) / CORNER_GAP).floor() as i32;
+            (-count..=count).map(|step| step as f32 * CORNER_GAP)
+        };
+        let centres = tried(0.5 * inside.width())
+            .flat_map(|x| tried(0.5 * inside.height()).map(move |y| rect.center() + vec2(x, y)));
+        let distance = |centre: &Pos2| centre.distance(rect.center());
+        let nearest = centres.filter(is_clear).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.map(|centre| Circle { centre, radius })
+    });
+    placed.into_iter().next().unwrap_or(least)
+}
+
 /// The clearance sphere seen normal to a plane: path and centre of the ball, contact, velocity, scale. `axes` point to the right
 /// and up; `speed` is the reference speed of the velocity arrow, m/s.
 pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
     let Sheet { painter, rect, palette, magnified, .. } = sheet;
     let report = &magnified.report;
-    let radius = CIRCLE_RADIUS * rect.size().min_elem();
-    // To the right of the words in the left corners, as far as the scale in the right one permits.
-    let off = 0.5 * rect.height() - CORNER_TEXT[1];
-    let chord = (radius * radius - off * off).max(0.0).sqrt();
-    let most = (0.5 * rect.width() - radius - SCALE_WIDTH).max(0.0);
-    let shift = (CORNER_TEXT[0] - (0.5 * rect.width() - chord)).clamp(0.0, most);
-    let circle = Circle { centre: rect.center() + vec2(shift, 0.0), radius };
+    let (circle, has_triad) = place_circle(*rect);
     let clearance = report.clearance as f32;
     let scale = circle.radius / clearance;
     let project = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
@@ -206,19 +254,25 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let fill = if touches { contact } else { sheet.ink };
     painter.circle(ball_centre, CENTRE_RADIUS, fill, Stroke::new(1.5, sheet.background));
 
-    triad(sheet, axes);
-    let bar = round_down(f64::from(clearance) * 0.9);
+    if has_triad {
+        triad(sheet, axes);
+    }
+    let bar = round_down(f64::from(clearance) * LARGEST_BAR);
     let end = pos2(rect.right() - 10.0, rect.bottom() - 9.0);
     sheet.bar(end, bar as f32 * scale, &length(bar, 3));
     let ruler = pos2(rect.left() + 10.0, rect.top() + 12.0);
     painter.arrow(ruler, vec2(ARROW_LENGTH, 0.0), Stroke::new(2.0, moving));
     let words = value::quantity(speed, "m/s", 3);
     let beside = ruler + vec2(ARROW_LENGTH + 6.0, 0.0);
-    sheet.words(beside, Align2::LEFT_CENTER, &words, moving);
+    let speed = sheet.words(beside, Align2::LEFT_CENTER, &words, moving);
     if path.len() > 1 {
         let words = format!("path of {}", path_length(path, now));
-        let below = ruler + vec2(0.0, 9.0);
-        sheet.words(below, Align2::LEFT_TOP, &words, colour(palette.trail));
+        let (at, align) = if has_triad {
+            (ruler + vec2(0.0, 9.0), Align2::LEFT_TOP)
+        } else {
+            (pos2(speed.right() + 8.0, ruler.y), Align2::LEFT_CENTER)
+        };
+        sheet.words(at, align, &words, colour(palette.trail));
     }
     circle
 }
@@ -374,6 +428,28 @@ mod tests {
         }
         assert_eq!(length(0.2e-3, 3), "0.2 mm");
         assert_eq!(length(2e-6, 3), "2 µm");
+    }
+
+    #[test]
+    fn no_words_cross_the_circle() {
+        for [width, height] in
+            [[134.0, 134.0], [310.0, 240.0], [206.0, 150.0], [118.0, 110.0], [320.0, 320.0], [400.0, 96.0]]
+        {
+            let rect = Rect::from_min_size(pos2(10.0, 20.0), vec2(width, height));
+            let (Circle { centre, radius }, has_triad) = place_circle(rect);
+            let triad = Align2::LEFT_BOTTOM.align_size_within_rect(CORNER_TRIAD, rect);
+            assert!(!has_triad || triad.distance_to_pos(centre) > radius, "{rect}");
+            assert_eq!(has_triad, width > 200.0, "{rect}");
+            assert!(rect.contains_rect(Rect::from_center_size(centre, Vec2::splat(2.0 * radius))), "{rect}");
+            let scale = vec2(CORNER_SCALE.x, CORNER_SCALE.y);
+            let scale = Align2::RIGHT_BOTTOM.align_size_within_rect(scale, rect);
+            let words = Align2::LEFT_TOP.align_size_within_rect(corner_text(rect, has_triad), rect);
+            assert!(words.distance_to_pos(centre) > radius && scale.distance_to_pos(centre) > radius, "{rect}");
+            assert!(radius >= 0.2 * rect.size().min_elem(), "{rect}: {radius}");
+        }
+        // A large picture has the largest circle in its middle.
+        let rect = Rect::from_min_size(pos2(0.0, 0.0), vec2(320.0, 320.0));
+        assert_eq!(place_circle(rect), (Circle { centre: rect.center(), radius: CIRCLE_RADIUS * 320.0 }, true));
     }
 
     #[test]

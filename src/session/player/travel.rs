@@ -251,6 +251,32 @@ impl Player {
         (MAX_BIN * self.automatic_window().min(self.plotted)).max(FINEST_BIN)
     }
 
+    /// Repeats the steps from `from` to `to`, s, if the record keeps them too coarsely for a plot of this range, and displays the same
+    /// instant again: a run that stands still in its past may be shown in another range than the one retraced when it went there.
+    pub fn retrace_range(&mut self, from: f64, to: f64) {
+        let (shown, from, to) = (self.pacer.shown(), from.max(0.0), to.min(self.reached));
+        let widest = (MAX_BIN * (to - from)).max(FINEST_BIN);
+        // A steady end of the run is always recorded in detail.
+        let is_coarse = |time: f64| self.record.resolution(time) > widest;
+        if self.playing
+            || self.is_seeking()
+            || shown >= self.reached
+            || to <= from
+            || !(is_coarse(from) || is_coarse(to))
+        {
+            return;
+        }
+        let most = self.steps();
+        let is_early_enough = |k: &Keyframe| k.state.time() <= from || k.state.steps() + MAX_RETRACED_STEPS <= most;
+        let start = self.keyframes.latest_regular(is_early_enough).map_or(0.0, |k| k.state.time());
+        self.restore(start.min(shown), true);
+        let end = Goal::at(to.max(shown));
+        // The same steps end in the same way.
+        let _ = self.step_towards(end.time, |player| end.is_reached(&player.simulation), |_| true);
+        let _ = self.arrive(end.time);
+        self.travel(shown);
+    }
+
     /// Restores the keyframe at `start`, s, after `steps` steps, or an earlier one if the history up to the instant `seen`, s,
     /// must be recorded in detail.
     fn restore_before(&mut self, start: f64, steps: u64, seen: f64) {
