@@ -375,10 +375,11 @@ fn a_lesson_on_a_phone_shows_the_controls_of_the_microscope_whole_or_not_at_all(
         if !harness.state_mut().microscope_mut().is_open() {
             continue;
         }
-        let below = harness.get_by_role_and_label(Role::Slider, "Timeline, s").rect().top();
+        // Less the margins of the two panels.
+        let below = harness.get_by_role_and_label(Role::Slider, "Timeline, s").rect().top() - 13.0;
         let choice = harness.query_by_role_and_label(Role::ComboBox, "Plane of the microscope");
         if let Some(place) = choice.map(|choice| choice.rect()) {
-            assert!(place.bottom() < below || place.top() > below - 8.0, "{name}: {place} above {below}");
+            assert!(place.bottom() <= below || place.top() >= below, "{name}: {place} above {below}");
         }
     }
 }
