@@ -1,6 +1,8 @@
-"""Writes the tables of docs/tradeoff.md, its diagrams and docs/tradeoff.csv from a folder of `jointplay tradeoff`: see docs/checks.md.
+"""Writes the tables of docs/tradeoff.md, its diagrams and docs/tradeoff.csv from a folder of `jointplay tradeoff`, or the table of pins from
+the output of a benchmark: see docs/checks.md.
 
 python docs/tradeoff.py FOLDER
+python docs/tradeoff.py pins.txt
 """
 
 from __future__ import annotations
@@ -80,6 +82,27 @@ def draw(scene: str, rows: pd.DataFrame) -> None:
     figure.savefig(DOCS / f"tradeoff-{scene}.svg", metadata={"Date": None})
 
 
+def write(parts: dict[str, str]) -> None:
+    """Exchanges parts of the page."""
+    page = (DOCS / "tradeoff.md").read_text(encoding="utf-8")
+    for name, text in parts.items():
+        before, rest = page.split(f"<!-- {name} -->\n")
+        page = f"{before}<!-- {name} -->\n{text}<!-- end -->{rest.split('<!-- end -->', 1)[1]}"
+    (DOCS / "tradeoff.md").write_text(page, encoding="utf-8")
+
+
+def pins(output: Path) -> None:
+    """The table of pins: a line of the benchmark names method and kind, the next one says how many times a ball it costs."""
+    lines = output.read_text(encoding="utf-8").splitlines()
+    costs = {}
+    for line, times in zip(lines, lines[1:]):
+        if " of a slider-crank, " in line:
+            method, kind = line.split(" of a slider-crank, ")[1].split("  ")[0].strip().split("/")
+            costs.setdefault(method, {})[kind] = times.split()[0]
+    kinds = list(next(iter(costs.values())))
+    write({"pins": markdown(" | ".join(["Method", *kinds]), [[f"`{m}`", *own.values()] for m, own in costs.items()])})
+
+
 def main(folder: Path) -> None:
     table = pd.read_csv(folder / "tradeoff.csv")
     scenes = list(table.groupby("scene", sort=False))
@@ -102,16 +125,13 @@ def main(folder: Path) -> None:
         "paces": markdown("Scene | Speed", [[f"`{scene}`", f"{pace:.3g}"] for scene, pace in record["pace"].items()]),
         "cheapest": markdown("Scene | " + " | ".join(map(plain, LIMITS.values())), [cheapest(*scene) for scene in scenes]),
     }
-    page = (DOCS / "tradeoff.md").read_text(encoding="utf-8")
-    for name, text in parts.items():
-        before, rest = page.split(f"<!-- {name} -->\n")
-        page = f"{before}<!-- {name} -->\n{text}<!-- end -->{rest.split('<!-- end -->', 1)[1]}"
+    write(parts)
     for scene, rows in scenes:
         if scene in DRAWN:
             draw(scene, rows)
-    (DOCS / "tradeoff.md").write_text(page, encoding="utf-8")
     shutil.copyfile(folder / "tradeoff.csv", DOCS / "tradeoff.csv")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    given = Path(sys.argv[1])
+    (main if given.is_dir() else pins)(given)
