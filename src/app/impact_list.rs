@@ -379,11 +379,14 @@ pub fn files(player: &Player) -> Vec<SaveFile> {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{}", values.join(","));
     }
-    let names: Vec<&str> = player.running().machine.loose_joints.iter().map(|joint| joint.name.as_str()).collect();
+    let joints = player.running().machine.loose_joints.iter();
+    let names: Vec<&str> = joints.clone().map(|joint| joint.name.as_str()).collect();
     let extra = [
         ("rows", json!(rows)),
         // Indices in the column `joint` start at 0.
         ("ball_joints", json!(names)),
+        // By joint, the names of the indices in the column `site`.
+        ("sites", joints.map(|joint| json!(joint.sites())).collect()),
         ("impacts_no_longer_kept", json!(player.impact_record().dropped())),
     ];
     let name = format!("{}-impacts.csv", file_stem(player));

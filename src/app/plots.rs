@@ -66,7 +66,7 @@ const PEAK_ROUNDING: f64 = 1e-5;
 /// The plots and their settings.
 #[derive(Default)]
 pub struct Plots {
-    /// Displayed quantities, in the order of [`Quantity::ALL`].
+    /// Displayed quantities, from top to bottom.
     pub chosen: Vec<Quantity>,
     /// Names or patterns of channels displayed after them, as in `run --channels`.
     pub picked: Vec<String>,
@@ -296,8 +296,8 @@ impl Plots {
             if ui.checkbox(&mut on, format!("{label}, {}", unit.0)).on_hover_text(help).changed() {
                 self.chosen.retain(|q| *q != quantity);
                 if on {
+                    // Below the others, which stay where they are.
                     self.chosen.push(quantity);
-                    self.chosen.sort_by_key(|q| Quantity::ALL.iter().position(|a| a == q));
                 }
             }
         }

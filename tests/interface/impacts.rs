@@ -310,6 +310,8 @@ fn the_file_has_the_columns_and_values_of_the_command_line() {
     click(&mut harness, "Impacts…");
     let saved = calls.borrow().saved.clone();
     assert!(saved[0].name.ends_with("-impacts.csv") && saved[1].name.ends_with(".meta.json"));
+    let meta = String::from_utf8(saved[1].bytes.clone()).expect("text");
+    assert!(meta.contains("\"sites\"") && meta.contains("\"ball_joints\""), "the places of the column `site`: {meta}");
     let text = String::from_utf8(saved[0].bytes.clone()).expect("text");
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().expect("a header").split(',').collect();

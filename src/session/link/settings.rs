@@ -99,11 +99,12 @@ impl Instruments {
     }
 }
 
-/// Reads quantities separated by commas or spaces, in the order of [`Quantity::ALL`]; `none` stands for none.
+/// Reads quantities separated by commas or spaces, each once, in the order in which they are shown; `none` stands for none.
 pub fn read_plots(text: &str) -> Result<Vec<Quantity>, String> {
     let mut chosen = Vec::new();
     for part in text.split([',', ' ']).filter(|part| !part.is_empty()) {
         match Quantity::ALL.iter().find(|q| q.word() == part) {
+            Some(quantity) if chosen.contains(quantity) => {}
             Some(quantity) => chosen.push(*quantity),
             None if part == "none" => {}
             None => {
@@ -112,8 +113,7 @@ pub fn read_plots(text: &str) -> Result<Vec<Quantity>, String> {
             }
         }
     }
-    let ordered = Quantity::ALL.into_iter().filter(|q| chosen.contains(q));
-    Ok(ordered.collect())
+    Ok(chosen)
 }
 
 /// The reverse of [`read_plots`].

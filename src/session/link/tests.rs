@@ -75,7 +75,13 @@ impl Random {
             follow: self.optional(|c| format!("joint.x{}x", c.text(6)).replace('\n', " ")),
             plots: self.optional(|c| {
                 let one = Quantity::ALL[c.below(16) as usize];
-                Quantity::ALL.into_iter().filter(|q| c.below(3) == 0 || *q == one && c.below(2) == 0).collect()
+                let others = Quantity::ALL.into_iter().filter(|q| *q != one);
+                let mut all: Vec<Quantity> = others.filter(|_| c.below(3) == 0).collect();
+                if c.below(2) == 0 {
+                    // In any order.
+                    all.insert(0, one);
+                }
+                all
             }),
             channels: self.optional(|c| {
                 let names = 0..c.below(4);
