@@ -338,11 +338,12 @@ fn legend(painter: &Painter, place: Rect, scale: f32, legend: &Legend, is_new: b
     let lay = |title: &String, ink| painter.layout_no_wrap(title.clone(), font.clone(), ink);
     let at = |words: &Galley| pos2(place.right() - words.size().x, place.top() - 1.0);
     if is_new {
-        // In the place of the title, and with its colours exchanged.
+        // In the place of the title, and with its colours exchanged; the plate stays within `place`, which the opening sentence
+        // covers in a narrow picture.
         let force = format_quantity_digits(f64::from(legend.reference), "N", 3);
         let words = lay(&format!("New scale: {force}"), halo);
-        let corner = at(&words) - vec2(4.0, 0.0);
-        painter.rect_filled(Rect::from_min_size(corner, words.size() + vec2(6.0, 1.0)), 3.0, ink);
+        let corner = at(&words) + vec2(-6.0, 1.0);
+        painter.rect_filled(Rect::from_min_size(corner, words.size() + vec2(6.0, 0.0)), 3.0, ink);
         painter.galley(corner + vec2(3.0, 0.0), words, halo);
     } else if let Some(title) =
         titles.iter().map(|title| lay(title, ink)).find(|words| words.size().x <= reserved + 24.0)

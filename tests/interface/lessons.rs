@@ -383,3 +383,16 @@ fn a_lesson_on_a_phone_shows_the_controls_of_the_microscope_whole_or_not_at_all(
         }
     }
 }
+
+#[test]
+fn the_buttons_of_a_lesson_lie_side_by_side_in_a_presentation() {
+    for screen in [[1280.0, 800.0], [1280.0, 720.0]] {
+        let mut harness = open_lesson("rattle", 1, screen);
+        present(&mut harness, screen);
+        let place = |name| harness.get_by_label(name).rect();
+        let places = ["Back", "Next", "More", "Leave the lesson"].map(place);
+        for pair in places.windows(2) {
+            assert!(pair[0].right() < pair[1].left(), "{screen:?}: {pair:?}");
+        }
+    }
+}

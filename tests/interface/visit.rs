@@ -475,3 +475,26 @@ fn every_scene_opens_with_one_sentence_that_leaves_by_itself_and_hides_no_machin
     harness.run_steps(2);
     assert!(!shows(&harness, DEFAULT_SCENE));
 }
+
+#[test]
+fn in_a_narrow_picture_the_sentence_covers_the_whole_legend() {
+    let (mut harness, _) = page::paced(AppOptions::default_scene(), LARGE, 1.0 / 60.0);
+    harness.key_press(Key::W);
+    let is_new = |harness: &Harness<'_, App>| {
+        let area = harness.get_by_label("3D view").rect().expand(60.0);
+        texts(harness, area).iter().any(|(text, _)| text.starts_with("New scale"))
+    };
+    let frames = (0..300).find(|_| {
+        harness.step();
+        is_new(&harness) && page::label(&harness, &sentence(DEFAULT_SCENE))
+    });
+    assert!(frames.is_some(), "the ruler has a new scale under the sentence");
+    let (view, words) = (harness.get_by_label("3D view").rect(), harness.get_by_label(&sentence(DEFAULT_SCENE)).rect());
+    let drawn = harness.render().expect("drawn");
+    // Between the picture and the first line, and right of it, is only the ground.
+    for y in view.bottom() as u32 + 1..words.top() as u32 {
+        for x in view.right() as u32 - 150..view.right() as u32 - 1 {
+            assert!(drawn.get_pixel(x, y).0[0] > 128, "dark at {x}, {y}");
+        }
+    }
+}

@@ -1,7 +1,8 @@
 //! The lesson panel: text, question, and navigation buttons.
 
 use eframe::egui::{
-    self, Button, FontFamily, Layout, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui, text::LayoutJob,
+    self, Button, Color32, FontFamily, Layout, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui,
+    text::LayoutJob,
 };
 
 use super::control_finder::ControlFinder;
@@ -18,8 +19,8 @@ const MIN_HEIGHT_WITH_TITLE: f32 = 290.0;
 const CHOICE_HEIGHT: f32 = 24.0;
 /// Hidden height of a page above which a button to scroll appears, points.
 const MIN_HIDDEN: f32 = 8.0;
-/// Width beside the navigation buttons below which the step counter is abbreviated, points.
-const MIN_COUNTER_WIDTH: f32 = 200.0;
+/// Smallest gap between the navigation buttons, points.
+const MIN_GAP: f32 = 2.0;
 
 impl Course {
     /// The whole panel. `low`: in a presentation operated by mouse, whose screen is low in points.
@@ -75,11 +76,18 @@ impl Course {
     }
 }
 
-/// Back, Next, progress, and Leave, at positions independent of the page. Returns the command, and whether to scroll.
+/// Back, Next, progress, and Leave, at positions independent of the page. Returns the command, and whether to scroll. In a narrow
+/// panel the progress is abbreviated, or gives way.
 fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool) {
     let (mut command, mut more) = (None, false);
     let last = running.lesson.steps.len() - 1;
     ui.horizontal(|ui| {
+        let names: &[&str] =
+            if running.hides_rest { &["Back", "Next", "More", "End"] } else { &["Back", "Next", "End"] };
+        let widths = names.iter().map(|name| width(ui, name, TextStyle::Button) + 2.0 * ui.spacing().button_padding.x);
+        let free = ui.available_width() - widths.sum::<f32>();
+        let gap = (free / (names.len() - 1) as f32).clamp(MIN_GAP, ui.spacing().item_spacing.x.max(MIN_GAP));
+        ui.spacing_mut().item_spacing.x = gap;
         for (forward, name, help, possible) in [
             (false, "Back", "Previous step (Page Up)", running.step > 0),
             (true, "Next", "Next step (Page Down)", running.step < last),
@@ -90,11 +98,10 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool) {
             }
         }
         let count = format!("{} of {}", running.step + 1, last + 1);
-        ui.label(if running.hides_rest && ui.available_width() < MIN_COUNTER_WIDTH {
-            count
-        } else {
-            format!("Step {count}")
-        });
+        let fits = |words: &String| width(ui, words, TextStyle::Body) + gap * names.len() as f32 <= free;
+        if let Some(words) = [format!("Step {count}"), count].into_iter().find(fits) {
+            ui.label(words);
+        }
         ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
             let help = "Ends the lesson and restores the window as it was before";
             let leave = ui.button("End").on_hover_text(help);
@@ -106,6 +113,12 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool) {
         });
     });
     (command, more)
+}
+
+/// Width of `words` in one line, points.
+fn width(ui: &Ui, words: &str, style: TextStyle) -> f32 {
+    let font = style.resolve(ui.style());
+    ui.painter().layout_no_wrap(words.to_owned(), font, Color32::PLACEHOLDER).size().x
 }
 
 impl RunningLesson {
