@@ -136,7 +136,9 @@ fn cells(class: usize, width: f32, time: bool, notes: usize) -> (Vec<Vec2>, f32)
 /// its digits, so that nothing moves as numbers change.
 pub fn strips(rect: Rect, overlay: &Overlay, notes: usize, options: &ViewOptions, map: bool) -> Strips {
     let large = fits_labels(rect);
-    let has_legend = overlay.legend && large && (options.arrows.normal || options.arrows.friction);
+    // In the row of other words the legend takes no room from the scene.
+    let has_row = overlay.room.words >= LEGEND_HEIGHT && !overlay.room.is_wide;
+    let has_legend = overlay.legend && (large || has_row) && (options.arrows.normal || options.arrows.friction);
     let has_scale = large && (map || options.wear != WearMap::Off);
     let strips = cut(rect, overlay, notes, has_legend, has_scale);
     // In a low picture the note on the colours must do.

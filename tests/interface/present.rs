@@ -185,6 +185,32 @@ fn a_double_click_on_the_bar_toggles_presentation_too() {
 }
 
 #[test]
+fn the_arrows_of_a_presentation_with_its_plot_have_their_ruler() {
+    for screen in [SCREEN, vec2(1280.0, 800.0), vec2(1920.0, 1080.0)] {
+        let mut harness = sized("measuring-machine", screen.into(), egui::Theme::Light);
+        harness.state_mut().player_mut().run_to(108e-3);
+        harness.run();
+        toggle_presentation(&mut harness, screen);
+        click(&mut harness, "Plot");
+        harness.run();
+        let texts: Vec<String> = harness
+            .output()
+            .shapes
+            .iter()
+            .filter_map(|shape| match &shape.shape {
+                Shape::Text(text) => Some(text.galley.text().to_owned()),
+                _ => None,
+            })
+            .collect();
+        assert!(texts.iter().any(|text| text.starts_with("Force")), "{screen:?}: {texts:?}");
+        if let Ok(folder) = std::env::var("LOOK") {
+            let image = harness.render().expect("drawn");
+            image.save(format!("{folder}/present-{}.png", screen.y)).expect("saved");
+        }
+    }
+}
+
+#[test]
 fn a_presentation_shows_what_is_stored() {
     for (name, scene, theme) in [
         ("presentation_light", "spcmm", egui::Theme::Light),
