@@ -1,6 +1,6 @@
 """Speed of the package: a step called from Python, a period of a controller, and two simulations in two threads.
 
-    pip install ./python && python python/bench.py
+    pip install ./python && python -P python/bench.py
 
 The package built by `./test python` is not optimised; its calls take some microseconds.
 """
