@@ -92,12 +92,12 @@ def write(parts: dict[str, str]) -> None:
 
 
 def pins(output: Path) -> None:
-    """The table of pins: a line of the benchmark names method and kind, the next one says how many times a ball it costs."""
+    """The table of pins: a line of the benchmark names method and kind, the second after it says how many times a ball it costs."""
     lines = output.read_text(encoding="utf-8").splitlines()
     costs = {}
-    for line, times in zip(lines, lines[1:]):
+    for line, times in zip(lines, lines[2:]):
         if " of a slider-crank, " in line:
-            method, kind = line.split(" of a slider-crank, ")[1].split("  ")[0].strip().split("/")
+            method, kind = line.split(" of a slider-crank, ")[1].split("/")
             costs.setdefault(method, {})[kind] = times.split()[0]
     kinds = list(next(iter(costs.values())))
     write({"pins": markdown(" | ".join(["Method", *kinds]), [[f"`{m}`", *own.values()] for m, own in costs.items()])})
