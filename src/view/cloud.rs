@@ -115,6 +115,12 @@ mod tests {
             let [red, green, blue, _] = point.colour;
             assert!(Vec3::new(red - r, green - g, blue - b).length() < 1e-3, "{share}");
         }
+        // Names keep off the points.
+        let cover = crate::view::Cover::of(&list, 2.0);
+        for [tip, _] in &cloud.arrows {
+            let at = camera.project(*tip, [1280, 720]).expect("in front");
+            assert_eq!(cover.covered_fractions(at, at), [1.0, 0.0], "{at}");
+        }
         assert!((list.error_scale.expect("a scale").largest - 223.6e-6).abs() < 1e-7);
         let label = list.labels.iter().find(|label| label.kind == LabelKind::Error).expect("in the picture");
         assert_eq!(*label.text, *"largest error 223.6 µm, contact ignored, drawn ×200");

@@ -41,12 +41,14 @@ impl Cover {
         Self { cell, columns, cells: vec![CoverKind::Empty; columns * rows], hull: Vec::new() }
     }
 
-    /// Cover of the machine in `list`, with cells of `cell` pixels. Arrows, ghosts, lines and shadows do not count.
+    /// Cover of the machine in `list`, and of the points of a map, with cells of `cell` pixels. Arrows, ghosts, lines and shadows do
+    /// not count.
     pub fn of(list: &DrawList, cell: f32) -> Self {
         let mut cover = Self::new(list.size, cell);
-        let step = (list.solid.len() + list.faded.len() + list.sockets.len()).div_ceil(MAX_INSTANCES).max(1);
+        let count = list.solid.len() + list.faded.len() + list.wear.len() + list.sockets.len();
+        let step = count.div_ceil(MAX_INSTANCES).max(1);
         let sphere = Mesh::Sphere.index();
-        for layer in [&list.faded, &list.solid] {
+        for layer in [&list.faded, &list.solid, &list.wear] {
             for (mesh, instances) in layer.by_mesh.iter().enumerate() {
                 // Only balls of joints have a facing sphere.
                 let kind = |instance: &Instance| {
