@@ -47,6 +47,8 @@ pub struct RunningLesson {
     has_new_result: bool,
     /// Whether the panel hides the lower part of the step.
     hides_rest: bool,
+    /// Whether the progress has no room between the buttons.
+    has_progress_in_title: bool,
     measured: LessonMeasures,
 }
 
@@ -60,6 +62,7 @@ impl RunningLesson {
             reached: false,
             has_new_result: false,
             hides_rest: false,
+            has_progress_in_title: false,
             measured: LessonMeasures::new(lesson.clone()),
             lesson,
         }

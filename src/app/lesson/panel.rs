@@ -33,7 +33,8 @@ impl Course {
         let own = running.is_setting_machine || running.is_run_of_step(player);
         let backwards = Layout::bottom_up(egui::Align::Min);
         ui.with_layout(backwards, |ui| {
-            let (command, more) = buttons(ui, running);
+            let (command, more, shows_progress) = buttons(ui, running);
+            running.has_progress_in_title = !shows_progress;
             ui.with_layout(Layout::top_down(egui::Align::Min), |ui| {
                 let id = (running.lesson.name.clone(), running.step);
                 let page = ScrollArea::vertical().id_salt(id).auto_shrink(false);
@@ -76,10 +77,10 @@ impl Course {
     }
 }
 
-/// Back, Next, progress, and Leave, at positions independent of the page. Returns the command, and whether to scroll. In a narrow
-/// panel the progress is abbreviated, or gives way.
-fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool) {
-    let (mut command, mut more) = (None, false);
+/// Back, Next, progress, and Leave, at positions independent of the page. Returns the command, whether to scroll, and whether
+/// the progress has room. In a narrow panel it is abbreviated, or stands in the title.
+fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool, bool) {
+    let (mut command, mut more, mut shows_progress) = (None, false, false);
     let last = running.lesson.steps.len() - 1;
     ui.horizontal(|ui| {
         let names: &[&str] =
@@ -97,10 +98,11 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool) {
                 command = Some(Command::TurnPage { forward });
             }
         }
-        let count = format!("{} of {}", running.step + 1, last + 1);
+        let count = running.progress();
         let fits = |words: &String| width(ui, words, TextStyle::Body) + gap * names.len() as f32 <= free;
         if let Some(words) = [format!("Step {count}"), count].into_iter().find(fits) {
             ui.label(words);
+            shows_progress = true;
         }
         ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
             let help = "Ends the lesson and restores the window as it was before";
@@ -112,7 +114,7 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool) {
             more = running.hides_rest && ui.button("More").on_hover_text(help).clicked();
         });
     });
-    (command, more)
+    (command, more, shows_progress)
 }
 
 /// Width of `words` in one line, points.
@@ -122,6 +124,11 @@ fn width(ui: &Ui, words: &str, style: TextStyle) -> f32 {
 }
 
 impl RunningLesson {
+    /// The step among all steps.
+    fn progress(&self) -> String {
+        format!("{} of {}", self.step + 1, self.lesson.steps.len())
+    }
+
     /// Title, text, question and answer of the step; returns whether to reset the machine. `own`: it runs as set by the step.
     fn page(&mut self, ui: &mut Ui, own: bool) -> bool {
         let lesson = self.lesson.clone();
@@ -133,7 +140,9 @@ impl RunningLesson {
                 // The answers come first.
                 ui.spacing_mut().item_spacing.y = 2.0;
             } else {
-                ui.label(RichText::new(&lesson.title).small().weak());
+                let progress =
+                    if self.has_progress_in_title { format!(" ({})", self.progress()) } else { String::new() };
+                ui.label(RichText::new(format!("{}{progress}", lesson.title)).small().weak());
             }
             spoken::heading(&ui.label(RichText::new(&step.title).heading().strong()), &step.title);
             if let Some(why) = self.measured.fault() {
