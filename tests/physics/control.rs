@@ -174,7 +174,7 @@ fn copies_and_files_of_a_state_continue_with_what_was_set() {
         run_until(&mut run, 0.01);
         run.control(&[(M, N::Force, 0.3), (S, N::Damping, 5.0)]).unwrap();
         run.set("spring.s.stiffness", "120 N/m").unwrap();
-        run.control(&[(M, N::Stiffness, 4.0)]).unwrap();
+        run.control(&[(M, N::Stiffness, 4.0), (M, N::Limit, f64::INFINITY)]).unwrap();
         run_until(&mut run, 0.03);
         let snapshot = run.snapshot();
         let text = SavedState::write(WRITER, snapshot.pending(), &snapshot, snapshot.time()).unwrap();
@@ -186,7 +186,7 @@ fn copies_and_files_of_a_state_continue_with_what_was_set() {
         let scene = saved.scene().unwrap();
         let mut read = LiveScene::new(&parse(MACHINE, &[("solver.method", method)])).unwrap();
         read.resume_changed(&saved.snapshot, scene.clone(), scene).unwrap();
-        assert_eq!(read.controlled(M, N::Stiffness), Some(4.0));
+        assert_eq!([N::Stiffness, N::Limit].map(|number| read.controlled(M, number)), [Some(4.0), Some(f64::INFINITY)]);
         for run in [&mut run, &mut read] {
             run_until(run, 0.1);
         }

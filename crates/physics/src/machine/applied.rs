@@ -88,7 +88,8 @@ pub enum ControlFault {
     },
 }
 
-/// A number that was set. Of a target: its position at t = 0, and its rate.
+/// A number that was set. Of a target: its position at t = 0, and its rate. The largest double stands for no limit, since a file of a
+/// state holds finite numbers only.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Control {
     element: usize,
@@ -147,7 +148,7 @@ impl LiveElements {
         let mut element = Cow::Borrowed(&self.of_scene(machine)[i]);
         for control in self.controls.iter().filter(|control| control.element == i) {
             if let Some(number) = element.to_mut().number_mut(control.number) {
-                *number = control.value;
+                *number = if control.value == f64::MAX { f64::INFINITY } else { control.value };
             }
         }
         element
@@ -176,6 +177,7 @@ impl LiveElements {
 
     /// Sets a number of element `i`, or of a target its position at t = 0 or its rate.
     pub(crate) fn set(&mut self, element: usize, number: ElementNumber, value: f64) {
+        let value = value.min(f64::MAX);
         let own = self.controls.iter_mut().find(|own| (own.element, own.number) == (element, number));
         match own {
             Some(own) => own.value = value,
