@@ -145,6 +145,7 @@ fn joints(player: &Player) -> Option<String> {
                 _ if settled => format!("{name} settled{at}{tilt}, {force}"),
                 ContactMode::Creep => format!("{name} in contact{at}, creeping{tilt}, {force}"),
                 ContactMode::Slip => format!("{name} in contact{at}, sliding{tilt}, {force}"),
+                ContactMode::Stick => format!("{name} in contact{at}, sticking{tilt}, {force}"),
             }
         })
         .collect();

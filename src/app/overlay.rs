@@ -292,7 +292,7 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
             ContactMode::Ideal => {
                 format!("{}  reaction {}", joint.name, newtons(&report.normal_force))
             }
-            ContactMode::Creep | ContactMode::Slip => format!(
+            ContactMode::Creep | ContactMode::Slip | ContactMode::Stick => format!(
                 "{}  normal {}, friction {}",
                 joint.name,
                 newtons(&report.normal_force),

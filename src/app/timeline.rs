@@ -328,7 +328,7 @@ fn weight(state: ContactMode) -> f32 {
     match state {
         ContactMode::Free => 0.0,
         ContactMode::Slip => 0.5,
-        ContactMode::Creep | ContactMode::Ideal => 1.0,
+        ContactMode::Creep | ContactMode::Stick | ContactMode::Ideal => 1.0,
     }
 }
 
@@ -444,6 +444,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
             Some((.., ContactMode::Free)) => "free",
             Some((.., ContactMode::Slip)) => "sliding",
             Some((.., ContactMode::Creep)) => "creeping",
+            Some((.., ContactMode::Stick)) => "sticking",
             Some((.., ContactMode::Ideal)) => "ideal",
         };
         let joint = &player.running().machine.loose_joints[index];

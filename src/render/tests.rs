@@ -846,7 +846,7 @@ fn a_rim_marks_the_contact_point_only_during_contact() {
         device.render(&list).expect("a picture")
     };
     let free = draw(ContactMode::Free);
-    for state in [ContactMode::Creep, ContactMode::Slip] {
+    for state in [ContactMode::Creep, ContactMode::Slip, ContactMode::Stick] {
         let seen = differing(&draw(state), &free, 12);
         assert!(seen.len() > 60, "{state:?}: {} pixels", seen.len());
         // A ring: nothing at the point itself, and nothing far from it.

@@ -23,6 +23,7 @@ pub fn contact(state: ContactMode, part: &str) -> String {
         ContactMode::Free => return format!("The {part} touches nothing"),
         ContactMode::Creep => "In contact, creeping",
         ContactMode::Slip => "In contact, sliding",
+        ContactMode::Stick => "In contact, sticking",
         ContactMode::Ideal => "Ideal joint: no clearance",
     };
     words.to_owned()

@@ -14,6 +14,7 @@ fn trial(name: &str) -> String {
     format!("{ROOT}/tests/trials/{name}.toml")
 }
 
+mod bristles;
 mod bushings;
 mod channels;
 mod closed_form;

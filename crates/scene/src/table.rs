@@ -92,7 +92,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 25] = [
+static TABLE: [Parameter; 29] = [
     contact_number!(
         clearance,
         "Clearance",
@@ -201,8 +201,41 @@ static TABLE: [Parameter; 25] = [
         "Friction law",
         FrictionLaw,
         "Friction force as a function of normal force and sliding velocity. modified-coulomb rises linearly between \
-         the two slip speeds; none leaves friction out.",
-        "Sheng & Chen (2024), eqs. 20, 21",
+         the two slip speeds, so that a loaded contact creeps; bristle sticks below its static limit and slides above \
+         it; none leaves friction out. A change to or from bristle acts at the next reset.",
+        "Sheng & Chen (2024), eqs. 20, 21 for modified-coulomb; Gonthier et al. (2004) for bristle",
+    ),
+    contact_number!(
+        static_friction_ratio,
+        "Static friction ratio",
+        number(D::None, 1.0, 10.0, "", (1.0, 3.0)),
+        "Coefficient of friction at rest over that of sliding, for the friction law bristle. Above 1, slow motions \
+         jerk: the contact sticks until the load breaks it away.",
+        "Dupont et al. (2002), eq. 9",
+    ),
+    contact_number!(
+        stribeck_speed,
+        "Stribeck speed",
+        logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
+        "v_s of the friction law bristle: at this sliding speed friction has fallen 63 % of the way from its static to \
+         its sliding value. Without effect at a static friction ratio of 1.",
+        "Dupont et al. (2002), eq. 9",
+    ),
+    contact_number!(
+        bristle_stiffness,
+        "Bristle stiffness",
+        logarithmic(D::Stiffness, 1e3, 1e12, "N/mm", (1e5, 1e9)),
+        "Tangential stiffness of a sticking contact of the friction law bristle. It yields by the load over this \
+         number before it slides. Steel surfaces have some 1e7 N/m at loads of some newtons and more at larger ones.",
+        "Gonthier et al. (2004)",
+    ),
+    contact_number!(
+        bristle_damping,
+        "Bristle damping",
+        logarithmic(D::Damping, 0.0, 1e9, "N s/m", (1.0, 1e5)),
+        "Damping of a sticking contact of the friction law bristle, so that what sticks stops ringing. It acts below \
+         the limit of friction only.",
+        "Gonthier et al. (2004)",
     ),
     gravity(
         "gravity.x",

@@ -76,7 +76,7 @@ impl MagnifiedJoint {
         let (ball, ball_spin) = velocity_of(frame, &spec.carried());
         let (socket, socket_spin) = velocity_of(frame, &spec.carrier());
         let velocity = ball - socket;
-        let touches = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
+        let touches = report.state.touches();
         let is_ball = spec.kind == LooseKind::Ball;
         let sliding = normal.filter(|_| touches && is_ball).map(|normal| {
             let law = Coefficients::new(&spec.contact, report.clearance);

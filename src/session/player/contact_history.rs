@@ -107,7 +107,7 @@ impl ContactHistory {
         let first = states.partition_point(|(time, _)| *time < from);
         let pairs = states[first.saturating_sub(1)..].windows(2);
         let is_touch = |pair: &&[(f64, ContactMode)]| {
-            pair[0].1 == ContactMode::Free && matches!(pair[1].1, ContactMode::Slip | ContactMode::Creep)
+            pair[0].1 == ContactMode::Free && pair[1].1.touches()
         };
         pairs
             .filter(is_touch)

@@ -176,7 +176,7 @@ pub(super) fn anchor(scene: &Scene, frame: &Frame, joint: usize) -> Option<Vec3>
 
 /// Whether the joint reports contact.
 pub(super) fn is_in_contact(report: &JointReport) -> bool {
-    matches!(report.state, ContactMode::Creep | ContactMode::Slip)
+    report.state.touches()
 }
 
 impl DrawnJoint {

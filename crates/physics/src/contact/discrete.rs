@@ -23,6 +23,8 @@ pub struct ContactStep {
     pub clearances: [f64; 2],
     /// Velocity used by friction at the start, m/s, not yet projected onto the tangent plane.
     pub slip: Vec3,
+    /// Deflection of the bristles at the start, m, in the tangent plane.
+    pub deflection: Vec3,
     /// Approach speed in the damping term so far, m/s.
     pub approach: f64,
     /// Force over elastic force with which the ball rebounds, in place of the law's damping: see [`Coefficients::rebound`].
@@ -122,7 +124,28 @@ impl Coefficients {
             }
             by_slip = resistance * (-2.0 * force);
         }
-        let by_velocity = direction * (end / after).transpose() * by_rate - tangent * (force * h / sum);
+        // How the force changes with the normal force: that of bristles below their limit does not.
+        let mut per_force = direction;
+        if let Some(bristles) = &self.bristles {
+            let sliding = tangent * (slip * 2.0 - step.slip);
+            let [bent, _] = bristles.step(step, &(tangent * slip), &sliding, force);
+            let unlimited = step.deflection + sliding * (step.h + bristles.lag);
+            let (length, limit) = (unlimited.norm(), bristles.limit(force, sliding.norm()));
+            let friction = bent * (bristles.stiffness / force);
+            direction -= friction;
+            // As above: the secant unless the direction is known.
+            let mut resistance = tangent;
+            if length > limit {
+                per_force -= friction;
+                resistance *= limit / length;
+                if length > 2.0 * slip_change * (step.h + bristles.lag) {
+                    let along = unlimited / length;
+                    resistance -= along * along.transpose() * (limit / length);
+                }
+            }
+            by_slip = resistance * (-2.0 * bristles.stiffness * (step.h + bristles.lag));
+        }
+        let by_velocity = per_force * (end / after).transpose() * by_rate - tangent * (force * h / sum);
         StepForce { force: direction * force, normal, by_velocity, by_slip }
     }
 
@@ -158,6 +181,7 @@ mod tests {
             start: normal * (3e-4 + depth),
             clearances: [3e-4; 2],
             slip: Vec3::new(0.01, 0.03, 0.0),
+            deflection: Vec3::zeros(),
             approach: 0.05,
             rebound: None,
         }

@@ -5,7 +5,7 @@
 //! loses the same part of its energy: the work of the damping, the integral of F chi delta_dot / delta_dot0 over the penetration, follows
 //! from the energies alone.
 
-use super::{ApproachSpeed, ElasticLaw, Elasticity, FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
+use super::{ApproachSpeed, Bristles, ElasticLaw, Elasticity, FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
 
 /// A law as a tooltip shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,6 +97,18 @@ impl FrictionLaw {
                 own("Coulomb friction with dynamic correction", "F = c_f c_d N against the sliding velocity v"),
                 own("Dynamic correction of friction", "c_d = 0 up to v0, (v - v0) / (v1 - v0) up to v1, then 1"),
             ],
+            Self::Bristle => [
+                ShownLaw {
+                    law: "Bristle friction",
+                    formula: "F = -(k z + d v) up to μ N, z: deflection of the bristles, z' = v below that limit",
+                    elsewhere: Some("Gonthier et al. (2004)"),
+                },
+                ShownLaw {
+                    law: "Stribeck's fall of friction",
+                    formula: "μ = μ_k + (μ_s - μ_k) exp(-(v / v_s)²), v: sliding speed",
+                    elsewhere: Some("Stribeck (1902)"),
+                },
+            ],
             Self::None => [own("No friction", "F = 0"); 2],
         }
     }
@@ -141,8 +153,10 @@ pub struct Coefficients {
     pub elastic: ElasticLaw,
     /// Damping factor chi.
     pub damping: f64,
-    /// Coulomb coefficient; 0 if the friction law is none.
+    /// Coefficient of the modified Coulomb law; 0 under another law.
     pub friction: f64,
+    /// Bristles of the bristle law.
+    pub bristles: Option<Bristles>,
     /// v_a, m/s.
     pub(crate) slip_low: f64,
     /// v_theta, m/s.
@@ -169,8 +183,9 @@ impl Coefficients {
             damping: parameters.normal_law.damping_factor(parameters.restitution),
             friction: match parameters.friction_law {
                 FrictionLaw::ModifiedCoulomb => parameters.friction,
-                FrictionLaw::None => 0.0,
+                FrictionLaw::Bristle | FrictionLaw::None => 0.0,
             },
+            bristles: Bristles::of(parameters),
             slip_low: parameters.slip_speed_low,
             slip_high: parameters.slip_speed_high,
             speed_floor: parameters.impact_speed_floor,

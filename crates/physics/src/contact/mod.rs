@@ -1,6 +1,7 @@
 //! Contact of a ball in its socket: pure functions of gap, rates and parameters. SI units, f64.
 
 mod approach;
+mod bristle;
 mod discrete;
 mod elastic;
 mod force;
@@ -10,6 +11,7 @@ mod slip;
 mod state;
 
 pub use approach::ApproachBranch;
+pub use bristle::{BristleForce, Bristles, Deflection};
 pub use discrete::{ContactStep, StepForce};
 pub use elastic::ElasticLaw;
 pub use force::{Force, Separation, Stiffness};
@@ -52,12 +54,15 @@ words!(NormalLaw {
 pub enum FrictionLaw {
     /// Modified Coulomb of Ambrósio, paper eqs. (20)-(21).
     ModifiedCoulomb,
+    /// Elastic bristles that slide at their limit, after Gonthier et al. (2004): sticks.
+    Bristle,
     /// No friction.
     None,
 }
 
 words!(FrictionLaw {
     ModifiedCoulomb => "modified-coulomb",
+    Bristle => "bristle",
     None => "none",
 });
 
@@ -120,8 +125,16 @@ pub struct Parameters {
     pub clearance: f64,
     /// Play of a pin along its axis, to each side, or of a block to each wall across the first two, m; 0: none. A ball has no other.
     pub second_clearance: f64,
-    /// Coulomb coefficient cf.
+    /// Coulomb coefficient cf; with bristles, the kinetic one.
     pub friction: f64,
+    /// Static over kinetic coefficient, at least 1: with bristles.
+    pub static_friction_ratio: f64,
+    /// v_s, m/s: the speed at which the coefficient has fallen most of the way from the static to the kinetic one, with bristles.
+    pub stribeck_speed: f64,
+    /// k > 0, N/m, of the bristles.
+    pub bristle_stiffness: f64,
+    /// d, N s/m, of the bristles.
+    pub bristle_damping: f64,
     /// Requested restitution ce, 0..=1.
     pub restitution: f64,
     /// Young's modulus E of both bodies, Pa.
@@ -154,6 +167,17 @@ impl Parameters {
         [self.clearance, self.second_clearance]
     }
 
+    /// Whether its contacts have bristles, whose deflections are part of the state.
+    pub fn has_bristles(&self) -> bool {
+        self.friction_law == FrictionLaw::Bristle && !self.is_ideal()
+    }
+
+    /// What determines the equations that the joint adds: whether it has each play, and bristles.
+    pub(crate) fn structure(&self) -> [bool; 3] {
+        let [first, second] = self.clearances().map(|play| play > 0.0);
+        [first, second, self.has_bristles()]
+    }
+
     /// Whether the joint has no play.
     pub fn is_ideal(&self) -> bool {
         self.clearances() == [0.0; 2]
@@ -169,6 +193,10 @@ impl Parameters {
         clearance: 0.3e-3,
         second_clearance: 0.0,
         friction: 0.15,
+        static_friction_ratio: 1.0,
+        stribeck_speed: 1e-3,
+        bristle_stiffness: 1e7,
+        bristle_damping: 1e3,
         restitution: 0.9,
         youngs_modulus: 206e9,
         poisson_ratio: 0.3,

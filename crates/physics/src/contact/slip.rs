@@ -19,6 +19,10 @@ pub enum FrictionBranch {
     Ramp,
     /// Above v_theta: full friction.
     Full,
+    /// Bristles below their limit.
+    Sticking,
+    /// Bristles at their limit.
+    Sliding,
 }
 
 impl Coefficients {
@@ -36,7 +40,7 @@ impl Coefficients {
     /// Distance of a sliding speed beyond the corners of `branch`, m/s; negative inside.
     pub fn excess_over_branch(&self, branch: FrictionBranch, speed: f64) -> f64 {
         match branch {
-            FrictionBranch::Unfrozen => f64::NEG_INFINITY,
+            FrictionBranch::Unfrozen | FrictionBranch::Sticking | FrictionBranch::Sliding => f64::NEG_INFINITY,
             FrictionBranch::DeadBand => speed - self.slip_low,
             // Without a dead band the ramp is smooth through zero speed.
             FrictionBranch::Ramp if self.slip_low == 0.0 => speed - self.slip_high,
@@ -53,7 +57,7 @@ impl Coefficients {
                 let ratio = self.friction_ratio(speed);
                 if ratio > 0.0 { ratio / speed } else { 0.0 }
             }
-            FrictionBranch::DeadBand => 0.0,
+            FrictionBranch::DeadBand | FrictionBranch::Sticking | FrictionBranch::Sliding => 0.0,
             FrictionBranch::Ramp => {
                 let low = self.slip_low;
                 let start = if low > 0.0 { low * inverse(speed, low).0 } else { 0.0 };
@@ -70,7 +74,7 @@ impl Coefficients {
                 let (ratio, slope) = (self.friction_ratio(speed), self.friction_slope(speed));
                 if speed > 0.0 { (slope - ratio / speed) / speed } else { 0.0 }
             }
-            FrictionBranch::DeadBand => 0.0,
+            FrictionBranch::DeadBand | FrictionBranch::Sticking | FrictionBranch::Sliding => 0.0,
             FrictionBranch::Ramp => {
                 let low = self.slip_low;
                 let start = if low > 0.0 { low * inverse(speed, low).1 } else { 0.0 };

@@ -66,6 +66,8 @@ impl Ramp {
 pub struct Contacts {
     contacts: Vec<Contact>,
     joints: Vec<JointContacts>,
+    /// Components of the bristles of all contacts.
+    bristles: usize,
     has_ramps: bool,
     /// Contacts of the same group act on one another.
     groups: Vec<usize>,
@@ -89,12 +91,17 @@ impl Contacts {
             ramps: [None; 2],
             contacts: compiled.contacts.clone(),
         });
+        let mut bristles = 0;
         let contacts = model.sites.iter().enumerate().map(|(id, &site)| {
             let parameters = &machine.loose_joints[site.joint].contact;
-            Contact::new(id, site, site.stiffness.coefficients(parameters, parameters.clearances()[site.play]))
+            let first_bristle = parameters.has_bristles().then_some(bristles);
+            bristles += 3 * usize::from(first_bristle.is_some());
+            let law = site.stiffness.coefficients(parameters, parameters.clearances()[site.play]);
+            Contact::new(id, site, law, first_bristle)
         });
         Self {
             contacts: contacts.collect(),
+            bristles,
             joints: joints.collect(),
             groups: groups(machine, model),
             has_ramps: false,
@@ -115,6 +122,39 @@ impl Contacts {
     /// Contacts of loose joint `j`; none if it is ideal.
     pub fn of_joint(&self, j: usize) -> Range<ContactId> {
         self.joints[j].contacts.clone()
+    }
+
+    /// Number of components of the state that are deflections of bristles: three per contact that has them.
+    pub fn bristles(&self) -> usize {
+        self.bristles
+    }
+
+    /// Components of contact `c` among those; `None` without bristles.
+    pub(super) fn bristles_of(&self, c: ContactId) -> Option<Range<usize>> {
+        self.contacts[c].bristles.map(|state| state.first..state.first + 3)
+    }
+
+    /// Begins a step at `t`, s, with the bristles `bristles`.
+    pub(super) fn begin_bristles(&mut self, t: f64, bristles: &[f64]) {
+        for state in self.contacts.iter_mut().filter_map(|contact| contact.bristles.as_mut()) {
+            state.begin(t, bristles);
+        }
+    }
+
+    /// Writes the rates of the bristles at the latest evaluation.
+    pub(super) fn bristle_rates(&self, rates: &mut [f64]) {
+        for state in self.contacts.iter().filter_map(|contact| contact.bristles.as_ref()) {
+            rates[state.first..state.first + 3].copy_from_slice(state.rate.as_slice());
+        }
+    }
+
+    /// Energy stored in the bristles, J.
+    pub(super) fn bristle_energy(&self, bristles: &[f64]) -> f64 {
+        let of = |contact: &Contact| {
+            let (state, law) = (contact.bristles?, contact.law.bristles?);
+            Some(law.energy(&Vec3::from_column_slice(&bristles[state.first..state.first + 3])))
+        };
+        self.contacts.iter().filter_map(of).sum()
     }
 
     /// Loose joint to which contact `c` belongs.

@@ -119,7 +119,7 @@ impl SolvedRow {
 
     /// Whether friction uses the velocity of the centres.
     fn follows_centres(&self) -> bool {
-        matches!(&self.law, Law::Contact(law) if law.friction > 0.0 && !law.uses_surface_velocity())
+        matches!(&self.law, Law::Contact(law) if law.has_friction() && !law.uses_surface_velocity())
     }
 }
 
@@ -189,7 +189,7 @@ pub struct StepStart<'a> {
 }
 
 impl DiscreteGradient {
-    /// For a state of `dimension` components, of which `positions` are positions, and elements between these bodies; `within` if
+    /// For a state of `dimension` components, of which `n` are velocities, and elements between these bodies; `within` if
     /// a force accelerates only the trees it acts on.
     ///
     /// # Errors
@@ -197,11 +197,10 @@ impl DiscreteGradient {
     fn new(
         model: &Model,
         dimension: usize,
-        positions: usize,
+        n: usize,
         within: bool,
         elements: &[[Anchor; 2]],
     ) -> Result<Self, MechanismError> {
-        let n = dimension - positions;
         let contacts = model.sites.len();
         let of_contacts = model.sites.iter().map(|site| [site.carried.body, site.carrier.body]);
         let of_elements = elements.iter().flat_map(|ends| [ends.map(|end| end.body); 2]);
@@ -263,6 +262,7 @@ impl DiscreteGradient {
                 start: start.eccentricity,
                 clearances: start.clearances,
                 slip: start.slip,
+                deflection: Vec3::zeros(),
                 approach: if contact_state.active {
                     contact_state.approach_speed
                 } else {
@@ -319,12 +319,13 @@ impl DiscreteGradient {
     }
 
     /// Jacobian columns of the contacts, and the mean velocities, from the motion at the middle with the guessed velocities.
-    fn linearise_rows(&mut self, model: &Model, equations: &dyn Equations) {
+    fn linearise_rows(&mut self, model: &Model, equations: &dyn Equations, (contacts, bristles): (&Contacts, &[f64])) {
         for row in &mut self.rows {
             let columns = &mut self.columns[row.index];
             if let Law::Contact(law) = &row.law {
                 let (site, n) = (&model.sites[row.index], row.normal);
                 let motion = equations.motion();
+                row.step.deflection = contacts.contact(row.index).deflection(bristles, &n, motion);
                 let spins = [site.carried.body, site.carrier.body].map(|body| &motion[body].angular_velocity);
                 // Along a bore or a plane the centres move without a change of e.
                 let relative = |site: &Site| site.opening(motion, &site.arms(motion)).1;
@@ -380,7 +381,7 @@ impl DiscreteGradient {
     fn solve(&mut self, h: f64, model: &Model, equations: &mut dyn Equations, counts: &mut Counts) -> bool {
         let half = 0.5 * h;
         let laws = self.rows.iter().filter_map(SolvedRow::contact);
-        let tolerance = laws.map(|(_, law)| law.slip_high).fold(VELOCITY_TOLERANCE, f64::min);
+        let tolerance = laws.map(|(_, law)| law.slow_sliding()).fold(VELOCITY_TOLERANCE, f64::min);
         let (mut merit, mut cuts, mut part) = (f64::INFINITY, 0, 1.0);
         let mut has_moved_normal_forces = false;
         // An element's row has no law of friction.
@@ -397,7 +398,7 @@ impl DiscreteGradient {
                         let slip_change =
                             if iteration > 0 { (row.added[1] - row.before[1]).norm() } else { f64::INFINITY };
                         let step_force = law.step_force(&row.step, &u, &s, slip_change);
-                        counts.friction += u64::from(step_force.force != Vec3::zeros() && law.friction > 0.0);
+                        counts.friction += u64::from(step_force.force != Vec3::zeros() && law.has_friction());
                         step_force
                     }
                     Law::Element(gain) => {
@@ -566,14 +567,14 @@ impl Mechanism {
     /// The contacts are coupled too widely.
     pub fn prepare_discrete_gradient(&mut self) -> Result<(), MechanismError> {
         if self.discrete.is_none() {
-            let (dimension, positions) = (self.dimension(), self.positions());
+            let (dimension, velocities) = (self.dimension(), self.velocities());
             let within = self.equations.is_block_diagonal();
             let motion = self.equations.motion();
             let world = self.model.bodies.len();
             let fixed = Anchor { body: world, offset: Vec3::zeros() };
             let ends = |element: &dyn ForceElement| element.ends(motion).unwrap_or([fixed; 2]);
             let elements: Vec<[Anchor; 2]> = self.elements.iter().map(|element| ends(&**element)).collect();
-            let discrete = DiscreteGradient::new(&self.model, dimension, positions, within, &elements)?;
+            let discrete = DiscreteGradient::new(&self.model, dimension, velocities, within, &elements)?;
             self.discrete = Some(Box::new(discrete));
         }
         Ok(())
@@ -602,8 +603,8 @@ impl Mechanism {
 
     /// Derivative of the velocities without contact forces at the middle of the latest such step.
     pub(crate) fn contact_free_acceleration(&self) -> &[f64] {
-        let positions = self.positions();
-        self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[positions..])
+        let velocities = self.velocity_range();
+        self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[velocities])
     }
 
     /// What touched in the latest such step, with the means over it; directions are those of the latest
@@ -654,7 +655,7 @@ impl Evaluator<'_> {
         }
         for pass in 0..2 {
             if pass > 0 {
-                let scale = &self.mechanism.scale()[positions..];
+                let scale = &self.mechanism.scale()[self.mechanism.velocity_range()];
                 let moved = discrete.mean.iter().zip(&discrete.guess).zip(scale);
                 let moved = moved.map(|((mean, guess), scale)| (mean - guess).abs() / scale).fold(0.0, f64::max) * h;
                 if moved < GUESS_TOLERANCE {
@@ -664,7 +665,7 @@ impl Evaluator<'_> {
             }
             for (part, at) in [(1.0, &mut discrete.end), (0.5, &mut discrete.middle)] {
                 at.copy_from_slice(y);
-                at[positions..].copy_from_slice(&discrete.guess);
+                at[self.mechanism.velocity_range()].copy_from_slice(&discrete.guess);
                 for (step, guess) in discrete.displacement.iter_mut().zip(&discrete.guess) {
                     *step = part * h * guess;
                 }
@@ -682,11 +683,12 @@ impl Evaluator<'_> {
             for (i, mean) in discrete.mean.iter_mut().enumerate() {
                 *mean = y[positions + i] + 0.5 * h * discrete.rate[positions + i];
             }
-            let Mechanism { model, equations, elements, .. } = &mut *self.mechanism;
-            let at = At { t: t + 0.5 * h, motion: equations.motion(), active_set: ActiveSet::Nothing };
+            let Mechanism { model, equations, elements, contacts, .. } = &mut *self.mechanism;
+            let bristles = &y[y.len() - contacts.bristles()..];
+            let at = At { t: t + 0.5 * h, motion: equations.motion(), active_set: ActiveSet::Nothing, bristles };
             discrete.gather_elements(model, elements, &**equations, &at, h);
             if !discrete.rows.is_empty() {
-                discrete.linearise_rows(model, &**equations);
+                discrete.linearise_rows(model, &**equations, (contacts, bristles));
                 discrete.compute_mobilities(model, &mut **equations);
                 if !discrete.solve(h, model, &mut **equations, &mut self.counts) {
                     return false;
@@ -703,8 +705,29 @@ impl Evaluator<'_> {
         for (i, mean) in discrete.mean.iter().enumerate() {
             y_end[positions + i] = 2.0 * mean - y[positions + i];
         }
+        self.bend_bristles(discrete, y_end);
         self.compute_discrete_powers(discrete, from);
         true
+    }
+
+    /// Deflections at the end of the step; zero without contact.
+    fn bend_bristles(&self, discrete: &DiscreteGradient, y_end: &mut [f64]) {
+        let Mechanism { model, equations, contacts, .. } = &*self.mechanism;
+        let first = y_end.len() - contacts.bristles();
+        y_end[first..].fill(0.0);
+        for row in &discrete.rows {
+            let Some((c, law)) = row.contact() else {
+                continue;
+            };
+            let Some(of) = contacts.bristles_of(c).filter(|_| !row.is_open()) else {
+                continue;
+            };
+            let n = row.law_force.normal;
+            let slip = row.free[1] + row.added[1];
+            let bent = law.deflection_after(&row.step, &n, &slip, -row.force.dot(&n));
+            let own = equations.motion()[model.sites[c].carrier.body].rotation.tr_mul(&bent);
+            y_end[first + of.start..first + of.end].copy_from_slice(own.as_slice());
+        }
     }
 
     /// Powers over the step: of the contacts from the work of their forces, of everything else at the middle.
@@ -759,7 +782,7 @@ impl Evaluator<'_> {
                 socket.force -= row.force;
                 socket.torque -= arm_socket.cross(&row.force) + turning * to_socket;
             }
-            let rates = &mut discrete.end[positions..];
+            let rates = &mut discrete.end[positions..positions + discrete.mean.len()];
             if equations.rows() > 0 {
                 // Includes the reactions of the ideal joints to the contact forces.
                 equations.accelerate(model, gravity, t, &discrete.middle, rates);

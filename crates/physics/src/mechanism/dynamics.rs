@@ -66,7 +66,7 @@ impl Mechanism {
     /// loops constrain them.
     pub fn mass_matrix(&mut self, t: f64, y: &[f64]) -> DMatrix<f64> {
         self.measure(t, y);
-        let n = self.dimension() - self.positions();
+        let n = self.velocities();
         let mut mass = DMatrix::zeros(n, n);
         for (b, columns) in self.body_columns().iter().enumerate() {
             let (body, rotation) = (&self.model.bodies[b], &self.motion()[b].rotation);
@@ -86,12 +86,12 @@ impl Mechanism {
     ///
     /// Of the tree formulation only: in the other the loads act on the bodies themselves.
     pub fn generalised_forces(&mut self, t: f64, y: &[f64], active_set: ActiveSet<'_>) -> DVector<f64> {
-        let (n, nq) = (self.dimension() - self.positions(), self.positions());
+        let n = self.velocities();
         let mut dy = vec![0.0; self.dimension()];
         self.evaluator(active_set).derivative(t, y, &mut dy);
         let wrench: Vec<_> = self.equations.loads().1[..self.model.massive].to_vec();
         // Accelerations where every coordinate's own is 0.
-        self.equations.complete_motion(&self.model, y, &vec![0.0; self.dimension() - nq]);
+        self.equations.complete_motion(&self.model, y, &vec![0.0; n]);
         let mut forces = DVector::zeros(n);
         for (b, columns) in self.body_columns().iter().enumerate() {
             let (body, m) = (&self.model.bodies[b], &self.motion()[b]);

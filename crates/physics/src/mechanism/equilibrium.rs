@@ -12,7 +12,7 @@ use super::drives::{Trajectory, trajectory_of};
 use super::model::Model;
 use super::settled::{settle, without_play};
 use super::{ActiveSet, Mechanism, MechanismError};
-use crate::contact::ContactState;
+use crate::contact::{ContactState, FrictionLaw};
 use crate::machine::{Drive, Formulation, LooseJoint, Machine, Mat3, StartRule, Vec3};
 use search::Search;
 
@@ -152,6 +152,10 @@ pub(super) fn with_constant_laws(machine: &Machine) -> Machine {
     for element in &mut constant.elements {
         let turns = element.is_on_hinge();
         element.law_mut().into_iter().for_each(|law| hold(law, turns));
+    }
+    // Nothing slides, and bristles are not bent.
+    for joint in &mut constant.loose_joints {
+        joint.contact.friction_law = FrictionLaw::None;
     }
     constant
 }

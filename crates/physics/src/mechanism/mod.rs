@@ -69,6 +69,7 @@ pub use systems::Evaluator;
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::contact::{ContactState, FrictionBranch};
 use crate::machine::{Formulation, LiveElements, Machine, MachineFault, Mat3, StartRule, Vec3};
 use crate::units::format_quantity_digits;
 use elements::{ForceElement, element_of, elements_of};
@@ -366,6 +367,8 @@ pub struct Mechanism {
     evaluation_time: f64,
     free_flight_bodies: Vec<FreeFlightBody>,
     active_ranges: ActiveRanges,
+    /// Scale of the state, if it has bristles.
+    scale: Vec<f64>,
 }
 
 /// Origin of the motion and the forces in a mechanism.
@@ -439,7 +442,12 @@ impl Mechanism {
             discrete: None,
             free_flight_bodies: Vec::new(),
             active_ranges: ActiveRanges::default(),
+            scale: Vec::new(),
         };
+        if mechanism.contacts.bristles() > 0 {
+            let bristles = std::iter::repeat_n(mechanism.model.length_scale, mechanism.contacts.bristles());
+            mechanism.scale = mechanism.equations.scale(&mechanism.model).iter().copied().chain(bristles).collect();
+        }
         mechanism.free_flight_bodies = FreeFlightBody::all(&mechanism, machine);
         mechanism.active_ranges = ActiveRanges::with_capacity(mechanism.free_flight_bodies.len());
         mechanism.suspend(|_| false);
@@ -531,7 +539,7 @@ impl Mechanism {
         self.contacts.measure(t, self.equations.motion());
     }
 
-    /// Components of the state read by [`Self::measure_one`] for contact `c`; `None` if it reads all.
+    /// Components of the state read by [`Self::measure_one`] for contact `c`, its bristles aside; `None` if it reads all.
     pub fn gap_components(&self, c: ContactId) -> Option<&[Range<usize>]> {
         self.paths[c].as_ref().map(|path| &path.parts[..])
     }
@@ -546,14 +554,83 @@ impl Mechanism {
         self.contacts.measure_one(c, t, self.equations.motion());
     }
 
+    /// Components of the bristles of contact `c`; `None` without any.
+    pub(crate) fn bristles_of(&self, c: ContactId) -> Option<Range<usize>> {
+        let first = self.first_bristle();
+        self.contacts.bristles_of(c).map(|of| first + of.start..first + of.end)
+    }
+
+    /// First component of the state that is a deflection of bristles: after the velocities.
+    fn first_bristle(&self) -> usize {
+        self.positions() + self.velocities()
+    }
+
+    /// Begins a step, or an evaluation outside of one, at (t, y): bristles slide from there.
+    pub(crate) fn begin_bristles(&mut self, t: f64, y: &[f64]) {
+        if self.contacts.bristles() > 0 {
+            let first = self.first_bristle();
+            self.contacts.begin_bristles(t, &y[first..]);
+        }
+    }
+
+    /// How far the bristles of contact `c` lie beyond `branch` in the motion last measured, at (t, y), m; `None` without bristles.
+    pub(crate) fn bristle_excess(
+        &self,
+        c: ContactId,
+        (t, y): (f64, &[f64]),
+        contact_state: &ContactState,
+        branch: FrictionBranch,
+    ) -> Option<f64> {
+        let at = (t, &y[self.first_bristle()..]);
+        self.contacts.contact(c).bristle_excess(at, self.motion(), contact_state, branch)
+    }
+
+    /// Applies the limits of the bristles to the state at the end of a step, in the motion last measured or evaluated there; returns
+    /// whether any had been exceeded. `settled`: the method has applied them itself, but to contacts that have ended.
+    pub(crate) fn settle_bristles(&mut self, t: f64, y: &mut [f64], contact_states: &[ContactState], settled: bool) -> bool {
+        if self.contacts.bristles() == 0 {
+            return false;
+        }
+        let first = self.first_bristle();
+        let mut changed = false;
+        for (c, contact_state) in contact_states.iter().enumerate() {
+            let Some(of) = self.bristles_of(c).filter(|_| !settled || !contact_state.active) else {
+                continue;
+            };
+            let contact = self.contacts.contact(c);
+            if let Some(settled) = contact.settled_deflection((t, &y[first..]), self.motion(), contact_state)
+                && y[of.clone()] != *settled.as_slice()
+            {
+                y[of].copy_from_slice(settled.as_slice());
+                changed |= contact_state.active;
+            }
+        }
+        changed
+    }
+
+    /// Energy stored in the bristles of the state `y`, J.
+    pub(crate) fn bristle_energy(&self, y: &[f64]) -> f64 {
+        if self.contacts.bristles() == 0 { 0.0 } else { self.contacts.bristle_energy(&y[self.first_bristle()..]) }
+    }
+
     /// Sliding speed of contact `c` in the motion last measured, m/s.
     pub fn slip_speed(&self, c: ContactId) -> f64 {
         self.contacts.slip_speed(c, self.motion())
     }
 
-    /// Number of components of a state: positions, then velocities.
+    /// Number of components of a state: positions, then velocities, then the deflections of bristles.
     pub fn dimension(&self) -> usize {
-        self.positions() + self.equations.velocities(&self.model)
+        self.first_bristle() + self.contacts.bristles()
+    }
+
+    /// Number of velocities.
+    pub fn velocities(&self) -> usize {
+        self.equations.velocities(&self.model)
+    }
+
+    /// Components of a state that are velocities.
+    pub fn velocity_range(&self) -> Range<usize> {
+        self.positions()..self.first_bristle()
     }
 
     /// Number of positions.
@@ -571,7 +648,7 @@ impl Mechanism {
 
     /// Absolute scale of each component of a state.
     pub fn scale(&self) -> &[f64] {
-        self.equations.scale(&self.model)
+        if self.scale.is_empty() { self.equations.scale(&self.model) } else { &self.scale }
     }
 
     /// Position rates from the velocities in `y`, into the leading components of `dy`.
@@ -832,13 +909,9 @@ impl Mechanism {
     /// Allocates the workspace of [`linearise`](crate::integrate::StiffSystem::linearise), so that steps do not allocate.
     pub(crate) fn prepare_linearisation(&mut self) {
         if self.stiff.is_none() {
-            let (dimension, positions) = (self.dimension(), self.positions());
-            self.stiff = Some(Box::new(stiff::Stiff::new(
-                &self.model,
-                dimension - positions,
-                dimension,
-                self.equations.is_block_diagonal(),
-            )));
+            let dimensions = [self.positions(), self.velocities(), self.contacts.bristles()];
+            let separate = self.equations.is_block_diagonal();
+            self.stiff = Some(Box::new(stiff::Stiff::new(&self.model, dimensions, separate)));
         }
     }
 

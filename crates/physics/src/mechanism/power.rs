@@ -67,7 +67,7 @@ impl Mechanism {
             element.add_powers(t, motion, &mut powers);
         }
         if !self.model.drives.is_empty() {
-            let dv = &dy[self.positions()..];
+            let dv = &dy[self.velocity_range()];
             let all = !self.sources.forces_suffice;
             let (model, gravity) = (&self.model, &self.gravity);
             powers.drive += self.equations.drive_power(model, gravity, y, dv, all);

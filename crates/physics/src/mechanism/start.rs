@@ -156,7 +156,9 @@ impl Mechanism {
             self.equations.treat_as_dependent(rank);
         }
         self.turns.start(&self.model, &mut tree, &y);
-        Ok(self.equations.state_of(&self.model, y, &tree.motion))
+        let mut state = self.equations.state_of(&self.model, y, &tree.motion);
+        state.resize(self.dimension(), 0.0);
+        Ok(state)
     }
 
     /// Closes the joints of `constraints` from the guess in `y`.

@@ -5,6 +5,9 @@
 //! of lever arms) are left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space, (s I - J) (x_q, x_v) = (b_q,
 //! b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s, x_q = (b_q + T x_v) / s, where T maps velocities to
 //! position rates.
+//!
+//! Bristles add deflections z with z' = S v and forces F_z z. As any Runge-Kutta method integrates S v as it does v, z moves with the
+//! positions: F_z S is part of K, and x_z = (b_z + S x_v) / s. (S turns with the surfaces, which the iteration corrects.)
 
 use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
@@ -14,6 +17,7 @@ use super::flight::ActiveRanges;
 use super::lu::Lu;
 use super::model::Model;
 use crate::integrate::{add_scaled, copy, divide};
+use crate::machine::{Mat3, Vec3};
 use nalgebra::Complex;
 use std::ops::Range;
 
@@ -53,15 +57,24 @@ pub struct Stiff {
     packed: Vec<f64>,
     pair: Vec<Complex<f64>>,
     moved: Vec<Complex<f64>>,
+    /// First velocity and first bristle of a state.
+    positions: usize,
+    first_bristle: usize,
+    /// By three components of the bristles: the columns of their contact, and the rotation into its carrier's axes; the columns of all.
+    bristles: Vec<(Range<usize>, Mat3)>,
+    slips: Vec<(usize, Vec3)>,
+    bristle_scratch: Vec<f64>,
+    bristle_scratch_im: Vec<f64>,
     /// Whether no contact or element carries a force: J is then zero except for q' = T v.
     empty: bool,
 }
 
 impl Stiff {
-    /// For `velocities` velocity coordinates in a state of `dimension`. With `separate`, a force accelerates only the trees it
-    /// acts on.
-    pub fn new(model: &Model, velocities: usize, dimension: usize, separate: bool) -> Self {
+    /// For a state of so many positions, velocities and components of bristles. With `separate`, a force accelerates only the trees
+    /// it acts on.
+    pub fn new(model: &Model, [positions, velocities, bristles]: [usize; 3], separate: bool) -> Self {
         let n = velocities;
+        let dimension = positions + velocities + bristles;
         let trees = if separate { trees_of(model) } else { std::iter::once(0..n).collect() };
         let mut tree_of = vec![0; n];
         for (tree_index, tree) in trees.iter().enumerate() {
@@ -87,11 +100,17 @@ impl Stiff {
             shift_pair: Complex::new(1.0, 1.0),
             scratch: vec![0.0; n],
             scratch_im: vec![0.0; n],
-            rate: vec![0.0; dimension - n],
-            rate_im: vec![0.0; dimension - n],
+            rate: vec![0.0; positions],
+            rate_im: vec![0.0; positions],
             packed: Vec::with_capacity(n),
             pair: Vec::with_capacity(n),
             moved: Vec::with_capacity(n),
+            positions,
+            first_bristle: positions + velocities,
+            bristles: vec![(0..0, Mat3::zeros()); bristles / 3],
+            slips: Vec::with_capacity(n * bristles / 3),
+            bristle_scratch: vec![0.0; bristles],
+            bristle_scratch_im: vec![0.0; bristles],
             empty: true,
         }
     }
@@ -114,10 +133,17 @@ impl Stiff {
         }
         self.is_coupled_pair.fill(false);
         self.empty = true;
-        let at = At { t, motion, active_set };
-        let of_contacts = contacts.iter().map(|contact| contact.coupling(&at));
-        let of_elements = elements.iter().map(|element| element.coupling(&at));
-        for coupling in of_contacts.chain(of_elements).flatten() {
+        let at = At { t, motion, active_set, bristles: &y[self.first_bristle..] };
+        self.slips.clear();
+        let of_contacts = contacts.iter().map(|contact| (contact.bristles, contact.coupling(&at)));
+        let of_elements = elements.iter().map(|element| (None, element.coupling(&at)));
+        for (bristles, coupling) in of_contacts.chain(of_elements) {
+            if let Some(state) = bristles {
+                self.bristles[state.first / 3].0 = 0..0;
+            }
+            let Some(coupling) = coupling else {
+                continue;
+            };
             self.empty = false;
             let (sides, n) = (&coupling.sides, &coupling.normal);
             if let Some(torque_derivatives) = &coupling.torque_derivatives {
@@ -128,6 +154,10 @@ impl Stiff {
             }
             self.add(&coupling);
             self.record_coupled_trees();
+            if let Some(state) = bristles {
+                let carrier = coupling.sides[1].0.body;
+                self.add_bristles(state.first / 3, &coupling, &motion[carrier].rotation);
+            }
         }
         self.coordinates.clear();
         for (tree_index, tree) in self.trees.iter().enumerate() {
@@ -177,9 +207,9 @@ impl Stiff {
     fn add(&mut self, coupling: &Coupling) {
         let (n, s) = (self.n, &coupling.stiffness);
         for l in &self.columns {
-            let force_q = s.by_displacement * l.centre;
             let normal_q = s.normal * l.centre;
             let slip = if coupling.uses_surface_velocity { l.surface } else { l.centre };
+            let force_q = s.by_displacement * l.centre + s.by_deflection * slip;
             let force_v = s.by_rate * l.centre + s.by_slip * slip;
             let lever = normal_q.cross(&coupling.force);
             for k in &self.columns {
@@ -187,6 +217,27 @@ impl Stiff {
                 self.by_position[at] += k.surface.dot(&force_q) + k.turn.dot(&lever);
                 self.by_velocity[at] += k.surface.dot(&force_v);
             }
+        }
+    }
+
+    /// Records how the velocities move the bristles of a contact, whose columns are those in `columns`.
+    fn add_bristles(&mut self, index: usize, coupling: &Coupling, rotation: &Mat3) {
+        let first = self.slips.len();
+        let n = &coupling.normal;
+        self.slips.extend(self.columns.iter().map(|column| {
+            let slip = if coupling.uses_surface_velocity { column.surface } else { column.centre };
+            (column.coordinate, slip - n * n.dot(&slip))
+        }));
+        self.bristles[index] = (first..self.slips.len(), rotation.transpose());
+    }
+
+    /// Adds S x_v to b_z, for the velocities in the state `x`.
+    fn move_bristles(&self, x: &[f64], b: &mut [f64]) {
+        for (i, (columns, rotation)) in self.bristles.iter().enumerate() {
+            let slips = self.slips[columns.clone()].iter();
+            let slip: Vec3 = slips.map(|(coordinate, slip)| slip * x[self.positions + coordinate]).sum();
+            let moved = rotation * slip;
+            b[3 * i..3 * i + 3].iter_mut().zip(moved.iter()).for_each(|(b, moved)| *b += moved);
         }
     }
 
@@ -269,8 +320,9 @@ impl Stiff {
 
     /// Solves (s I - J) x = b in place for the active components.
     pub fn solve(&mut self, b: &mut [f64], active_ranges: &ActiveRanges, equations: &dyn Equations, model: &Model) {
-        let positions = b.len() - self.n;
+        let positions = self.positions;
         let s = self.shift;
+        self.bristle_scratch.copy_from_slice(&b[self.first_bristle..]);
         if self.empty {
             divide(active_ranges.velocities(), b, s);
         } else {
@@ -296,6 +348,12 @@ impl Stiff {
         equations.position_rate(model, &self.y, &mut self.rate);
         add_scaled(active_ranges.positions(), b, 1.0, &self.rate);
         divide(active_ranges.positions(), b, s);
+        if !self.bristles.is_empty() {
+            let mut moved = std::mem::take(&mut self.bristle_scratch);
+            self.move_bristles(b, &mut moved);
+            b[self.first_bristle..].iter_mut().zip(&moved).for_each(|(x, moved)| *x = moved / s);
+            self.bristle_scratch = moved;
+        }
     }
 
     /// As [`Self::solve`] with the complex shift, for `re` + i `im`.
@@ -307,8 +365,10 @@ impl Stiff {
         equations: &dyn Equations,
         model: &Model,
     ) {
-        let positions = re.len() - self.n;
+        let positions = self.positions;
         let inverse = self.shift_pair.inv();
+        self.bristle_scratch.copy_from_slice(&re[self.first_bristle..]);
+        self.bristle_scratch_im.copy_from_slice(&im[self.first_bristle..]);
         if !self.empty {
             let (re_q, re_v) = re.split_at(positions);
             let (im_q, im_v) = im.split_at(positions);
@@ -340,6 +400,16 @@ impl Stiff {
             add_scaled(active_ranges.positions(), part, 1.0, rate);
         }
         multiply(active_ranges.positions(), re, im, inverse);
+        if !self.bristles.is_empty() {
+            let mut moved = [&mut self.bristle_scratch, &mut self.bristle_scratch_im].map(std::mem::take);
+            self.move_bristles(re, &mut moved[0]);
+            self.move_bristles(im, &mut moved[1]);
+            for (i, (re_z, im_z)) in moved[0].iter().zip(&moved[1]).enumerate() {
+                let x = inverse * Complex::new(*re_z, *im_z);
+                (re[self.first_bristle + i], im[self.first_bristle + i]) = (x.re, x.im);
+            }
+            [self.bristle_scratch, self.bristle_scratch_im] = moved;
+        }
     }
 }
 

@@ -40,7 +40,8 @@ impl Evaluator<'_> {
         self.derivative(t, y, dy);
         let Mechanism { model, equations, contacts, latest, .. } = &mut *self.mechanism;
         *latest = Latest::Unknown;
-        equations.complete_motion(model, y, &dy[equations.positions(model)..]);
+        let (positions, velocities) = (equations.positions(model), equations.velocities(model));
+        equations.complete_motion(model, y, &dy[positions..positions + velocities]);
         // Forces are those of the derivative; only the geometry of ideal joints is missing.
         contacts.measure(t, equations.motion());
     }
@@ -53,7 +54,8 @@ impl Evaluator<'_> {
         turns.follow(elements, &**equations, model, (t, y));
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
-        let at = At { t, motion, active_set: self.active_set };
+        let bristles = &y[y.len() - contacts.bristles()..];
+        let at = At { t, motion, active_set: self.active_set, bristles };
         let mut loads = Loads { wrench, counts: &mut self.counts, has_left_branch: &mut *self.has_left_branch };
         contacts.load(&at, &mut loads);
         for element in elements {
@@ -88,8 +90,10 @@ impl System for Evaluator<'_> {
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.counts.equations += 1;
         self.load(t, y);
-        let Mechanism { model, equations, gravity, latest, .. } = &mut *self.mechanism;
-        let (dq, dv) = dy.split_at_mut(equations.positions(model));
+        let Mechanism { model, equations, contacts, gravity, latest, .. } = &mut *self.mechanism;
+        let (moving, bristles) = dy.split_at_mut(y.len() - contacts.bristles());
+        contacts.bristle_rates(bristles);
+        let (dq, dv) = moving.split_at_mut(equations.positions(model));
         equations.position_rate(model, y, dq);
         equations.accelerate(model, gravity, t, y, dv);
         *latest = Latest::Evaluated(t);

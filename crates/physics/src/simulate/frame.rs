@@ -105,12 +105,21 @@ pub enum ContactMode {
     #[default]
     Free,
     /// In contact, sliding slower than `slip_speed_high`, where friction is below its full value: any tangential load makes the
-    /// ball creep; it never sticks.
+    /// ball creep.
     Creep,
     /// In contact and sliding.
     Slip,
+    /// In contact, with friction below its limit, where it has bristles: it does not slide.
+    Stick,
     /// No clearance: a constraint.
     Ideal,
+}
+
+impl ContactMode {
+    /// Whether it touches and carries friction.
+    pub fn touches(self) -> bool {
+        matches!(self, Self::Creep | Self::Slip | Self::Stick)
+    }
 }
 
 /// One joint with play at one instant; what is said of a ball holds for a pin and a block, too. SI units, world axes.

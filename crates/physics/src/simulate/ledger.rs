@@ -14,7 +14,7 @@ pub struct Ledger {
     pub gravity_work: f64,
     /// Change of the kinetic energy of all bodies.
     pub kinetic_change: f64,
-    /// Change of the elastic energy in contacts and springs.
+    /// Change of the elastic energy in contacts, with that of bristles, and springs.
     pub elastic_change: f64,
     /// Dissipated by the damping part of the normal forces, with their cut-off at 0 included.
     pub restitution_loss: f64,
@@ -158,6 +158,13 @@ impl PowerInterpolant {
             *time = (*time - from) / h;
         }
         shifted
+    }
+
+    /// Takes `power`, W, which something stores throughout, from what friction dissipates.
+    pub(super) fn store_of_friction(&mut self, power: f64) {
+        for powers in &mut self.powers[..self.count] {
+            powers.friction -= power;
+        }
     }
 
     /// Integral of the polynomial from 0 to `end`.

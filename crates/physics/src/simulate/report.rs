@@ -4,7 +4,10 @@ use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactMode, Frame, JointReport, SiteReport};
 use crate::contact::ContactState;
 use crate::machine::{Attachment, LooseJoint, LooseKind, Machine, Vec3};
-use crate::mechanism::{ContactId, Mechanism, angle_of};
+use crate::mechanism::{ContactId, Contacts, Mechanism, angle_of};
+
+/// Share of the limit of friction from which bristles count as sliding: at the limit, to rounding.
+const AT_LIMIT: f64 = 1.0 - 1e-9;
 
 /// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
 /// contact states `contact_states`.
@@ -37,7 +40,7 @@ pub(super) fn fill(
     }
     out.closing.clear();
     out.closing.extend(mechanism.closing_loads());
-    out.elastic = mechanism.elastic_energy(time);
+    out.elastic = mechanism.elastic_energy(time) + mechanism.bristle_energy(y);
     out.elements.clear();
     out.elements.extend(mechanism.element_reports(time));
     let (kinetic, gravitational) = mechanism.energies();
@@ -94,6 +97,9 @@ fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[Con
         friction_force: sum(&friction),
         state: if !contact_states[c].active && gap.normal_force == 0.0 {
             ContactMode::Free
+        } else if coefficients.bristles.is_some() {
+            // One that sticks holds the joint.
+            if contacts.of_joint(j).any(|c| sticks(contacts, c)) { ContactMode::Stick } else { ContactMode::Slip }
         } else if gap.slip_speed < coefficients.slip_high {
             ContactMode::Creep
         } else {
@@ -101,6 +107,13 @@ fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[Con
         },
         ..report
     }
+}
+
+/// Whether contact `c` presses and has bristles below their limit.
+fn sticks(contacts: &Contacts, c: ContactId) -> bool {
+    let gap = contacts.gap(c);
+    let bristles = contacts.coefficients(c).bristles.filter(|_| gap.normal_force > 0.0);
+    bristles.is_some_and(|b| gap.friction.norm() < AT_LIMIT * b.coefficient(gap.slip_speed) * gap.normal_force)
 }
 
 /// Of the carried part from its place without play: across the axis, along it (m), and the angle (rad).

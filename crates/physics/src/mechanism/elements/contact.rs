@@ -1,8 +1,8 @@
 //! A contact of a joint with play, between a part and a wall, by the laws in `contact`.
 
 use super::{ActiveSet, At, Coupling, ForceElement, Loads};
-use crate::contact::{Coefficients, Force, Separation};
-use crate::machine::Vec3;
+use crate::contact::{BristleForce, Coefficients, ContactState, Deflection, Force, FrictionBranch, Separation, Stiffness};
+use crate::machine::{Mat3, Vec3};
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::loose::{Spot, Wall};
 use crate::mechanism::model::{Anchor, ContactId, Site};
@@ -32,11 +32,133 @@ pub struct Contact {
     pub site: Site,
     pub law: Coefficients,
     pub gap: Gap,
+    /// Its bristles, if its law of friction has them.
+    pub bristles: Option<BristleState>,
+}
+
+/// The bristles of a contact within a step; in axes fixed to the carrier.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BristleState {
+    /// First of their three components among those of all bristles.
+    pub first: usize,
+    /// Time at which the step began, s, and the deflection there, m.
+    began: f64,
+    start: Vec3,
+    /// Sliding velocity at the latest evaluation, m/s; 0 without a force.
+    pub rate: Vec3,
+}
+
+impl BristleState {
+    /// Components of the state.
+    fn of(&self, bristles: &[f64]) -> Vec3 {
+        Vec3::from_column_slice(&bristles[self.first..self.first + 3])
+    }
+
+    /// Begins a step at `t` with the bristles `bristles`.
+    pub fn begin(&mut self, t: f64, bristles: &[f64]) {
+        (self.began, self.start) = (t, self.of(bristles));
+    }
+
+    /// In the plane across `normal`, for the carrier's `rotation`.
+    fn deflection(&self, t: f64, bristles: &[f64], normal: &Vec3, rotation: &Mat3) -> Deflection {
+        let in_plane = |own: Vec3| {
+            let turned = rotation * own;
+            turned - normal * normal.dot(&turned)
+        };
+        Deflection {
+            start: in_plane(self.start),
+            displaced: in_plane(self.of(bristles)),
+            elapsed: t - self.began,
+        }
+    }
 }
 
 impl Contact {
-    pub fn new(id: ContactId, site: Site, law: Coefficients) -> Self {
-        Self { id, site, law, gap: Gap::default() }
+    /// `first_bristle`: place of its bristles among those of all contacts, if it has any.
+    pub fn new(id: ContactId, site: Site, law: Coefficients, first_bristle: Option<usize>) -> Self {
+        let bristles = first_bristle.map(|first| BristleState { first, ..BristleState::default() });
+        Self { id, site, law, gap: Gap::default(), bristles }
+    }
+
+    /// Friction of the bristles under the normal force of `gap` at the separation there, on the branch `branch`; with the deflection
+    /// and the sliding velocity of the surfaces. `None` without bristles.
+    fn bristle_friction(
+        &self,
+        (t, bristles): (f64, &[f64]),
+        motion: &[Kinematics],
+        branch: FrictionBranch,
+        normal_force: f64,
+    ) -> Option<(BristleForce, Deflection, Vec3)> {
+        let (state, law) = (self.bristles.as_ref()?, self.law.bristles.as_ref()?);
+        let at = &self.gap.separation;
+        let slip = at.sliding_velocity(&self.slip_velocity(&at.normal, motion));
+        let rotation = &motion[self.site.carrier.body].rotation;
+        let deflection = state.deflection(t, bristles, &at.normal, rotation);
+        Some((law.force(branch, &deflection, &slip, normal_force), deflection, slip))
+    }
+
+    /// Normal force at the gap last measured in this contact state, N.
+    fn measured_normal_force(&self, contact_state: &ContactState) -> f64 {
+        let at = &self.gap.separation;
+        self.law.normal_force(at.penetration, at.rate, contact_state.approach(&self.law, at.rate))
+    }
+
+    /// How far the bristles lie beyond `branch` at the gap last measured, m; `None` without bristles.
+    pub fn bristle_excess(
+        &self,
+        at: (f64, &[f64]),
+        motion: &[Kinematics],
+        contact_state: &ContactState,
+        branch: FrictionBranch,
+    ) -> Option<f64> {
+        let normal_force = self.measured_normal_force(contact_state);
+        self.bristle_friction(at, motion, branch, normal_force).map(|(force, ..)| force.excess)
+    }
+
+    /// The deflection within its limit at the gap last measured, carrier's axes, m: that with which the next step starts; `None`
+    /// without bristles.
+    pub fn settled_deflection(
+        &self,
+        at: (f64, &[f64]),
+        motion: &[Kinematics],
+        contact_state: &ContactState,
+    ) -> Option<Vec3> {
+        if !contact_state.active {
+            return self.bristles.map(|_| Vec3::zeros());
+        }
+        let normal_force = self.measured_normal_force(contact_state);
+        let (_, deflection, slip) = self.bristle_friction(at, motion, FrictionBranch::Unfrozen, normal_force)?;
+        let settled = self.law.bristles.as_ref()?.settled(&deflection, &slip, normal_force);
+        Some(motion[self.site.carrier.body].rotation.tr_mul(&settled))
+    }
+
+    /// World axes, m, in the plane across `normal`; zero without bristles.
+    pub fn deflection(&self, bristles: &[f64], normal: &Vec3, motion: &[Kinematics]) -> Vec3 {
+        self.bristles.map_or_else(Vec3::zeros, |state| {
+            state.deflection(0.0, bristles, normal, &motion[self.site.carrier.body].rotation).displaced
+        })
+    }
+
+    /// Adds bristle friction to the gap just loaded; returns whether it has left its branch.
+    #[inline(never)]
+    fn load_bristles(&mut self, at: &At<'_>, contact_state: &ContactState) -> bool {
+        let found = self.bristle_friction((at.t, at.bristles), at.motion, contact_state.friction_branch, self.gap.normal_force);
+        let (Some((force, _, slip)), Some(state)) = (found, &mut self.bristles) else {
+            return false;
+        };
+        state.rate = at.motion[self.site.carrier.body].rotation.tr_mul(&slip);
+        self.gap.friction = force.force;
+        self.gap.slip_speed = slip.norm();
+        force.excess > 0.0
+    }
+
+    /// Adds the derivatives of the bristles' friction to those of the normal force.
+    fn add_bristles(&self, at: &At<'_>, contact_state: &ContactState, stiffness: &mut Stiffness) {
+        let branch = contact_state.friction_branch;
+        let found = self.bristle_friction((at.t, at.bristles), at.motion, branch, self.gap.normal_force);
+        if let Some((force, ..)) = found {
+            stiffness.add_bristles(&self.gap.separation.normal, &force);
+        }
     }
 
     /// Whether it may carry a force.
@@ -122,6 +244,9 @@ impl Contact {
         let (e, velocity) = site.opening(at.motion, &arms);
         let gap = &mut self.gap;
         *gap = Gap { eccentricity: e, eccentricity_rate: velocity, ..Gap::default() };
+        if let Some(bristles) = &mut self.bristles {
+            bristles.rate = Vec3::zeros();
+        }
         let clearance = law.clearance;
         let rotation = &at.motion[site.carrier.body].rotation;
         if !wall.is_beyond(&e, clearance, rotation) {
@@ -139,18 +264,24 @@ impl Contact {
             let levers = wall.levers(law, separation.distance);
             law.slip_velocity(&separation.normal, &velocity, [spin(&site.carried), spin(&site.carrier)], levers)
         });
-        if let Some(has_left_branch) = loads.has_left_branch.get_mut(self.id) {
-            *has_left_branch |= law.leaves_branch(contact_state, &separation, &force);
-        }
+        let mut leaves = law.leaves_branch(contact_state, &separation, &force);
         gap.normal_force = force.normal;
         gap.friction = force.friction;
         gap.slip_speed = force.slip_speed;
+        let levers = wall.levers(law, separation.distance);
+        if self.bristles.is_some() && force.normal > 0.0 {
+            counts.friction += 1;
+            leaves |= self.load_bristles(at, contact_state);
+        }
+        if let Some(has_left_branch) = loads.has_left_branch.get_mut(self.id) {
+            *has_left_branch |= leaves;
+        }
         if force.normal == 0.0 {
             return;
         }
-        let n = separation.normal;
-        let on_ball = n * -force.normal + force.friction;
-        let [to_ball, to_socket] = wall.levers(law, separation.distance);
+        let (site, n) = (&self.site, separation.normal);
+        let on_ball = n * -force.normal + self.gap.friction;
+        let [to_ball, to_socket] = levers;
         let [arm_ball, arm_socket] = arms;
         let ball = &mut loads.wrench[site.carried.body];
         ball.force += on_ball;
@@ -188,6 +319,7 @@ impl ForceElement for Contact {
             law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force, &confined);
         let distance = gap.separation.distance;
         let levers = site.wall.levers(law, distance);
+        self.add_bristles(at, contact_state, &mut stiffness);
         stiffness.add_normal_rotation(&law.slip_velocity_by_normal(self.spins(at.motion), levers));
         Some(Coupling {
             sides: site.sides(law, distance, at.motion),

@@ -91,6 +91,8 @@ pub(super) struct At<'a> {
     pub t: f64,
     pub motion: &'a [Kinematics],
     pub active_set: ActiveSet<'a>,
+    /// Deflections of the contacts' bristles, m; empty without any.
+    pub bristles: &'a [f64],
 }
 
 /// A number that shows on which side of an edge of its force an element is.

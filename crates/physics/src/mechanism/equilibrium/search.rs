@@ -421,7 +421,7 @@ impl Search<'_> {
             }
         }
         let mut wrench = vec![Wrench::zero(); pose.motion.len()];
-        let at = At { t: 0.0, motion: &pose.motion, active_set: ActiveSet::Nothing };
+        let at = At { t: 0.0, motion: &pose.motion, active_set: ActiveSet::Nothing, bristles: &[] };
         for element in &mut mechanism.elements {
             wrench.fill(Wrench::zero());
             let mut counts = Counts::default();

@@ -271,7 +271,7 @@ pub(super) const TABLE: &[Signal] = &[
     in_run(5, on_request("@.penetration_rate", "@_penetration_rate_m_s", Joint(|joint| joint.penetration_rate), "rate of the penetration")),
     in_run(5, on_request("@.force.#", "@_force_#_N", JointAxes(|joint| joint.normal_force + joint.friction_force), "force on the carried part; of an ideal joint, its reaction")),
     in_run(5, on_request("@.friction.#", "@_friction_#_N", JointAxes(|joint| joint.friction_force), "friction force on the carried part")),
-    in_run(5, on_request("@.state", "@_state", Joint(|joint| state_code(joint.state)), "0 free, 1 creep (slower than slip_speed_high), 2 slip, 3 ideal")),
+    in_run(5, on_request("@.state", "@_state", Joint(|joint| state_code(joint.state)), "0 free, 1 creep (slower than slip_speed_high), 2 slip, 3 ideal, 4 stick")),
 
     in_run(0, on_request(TIME, "t_s", Scalar("time", |frame| frame.time), "simulated time")),
     in_plot_and_run(Q::Position, 0, on_request("@.pose.#", "#_m", Axes(|pose| pose.position), "origin of the output body")),
@@ -361,5 +361,6 @@ fn state_code(state: ContactMode) -> f64 {
         ContactMode::Creep => 1.0,
         ContactMode::Slip => 2.0,
         ContactMode::Ideal => 3.0,
+        ContactMode::Stick => 4.0,
     }
 }

@@ -96,7 +96,7 @@ impl Stepping<'_> {
         let Self { mechanism, state, .. } = self;
         let touching = || state.now.contact_states.iter().enumerate().filter(|(_, m)| m.active).map(|(c, _)| c);
         let undamped = |c| mechanism.contacts.coefficients(c).damping == 0.0;
-        let velocities = state.now.y.len() - mechanism.positions();
+        let velocities = mechanism.velocities();
         if state.conditions.solver.method == Method::Automatic
             && velocities <= mechanism.largest_implicit()
             && touching().next().is_some()
@@ -122,7 +122,7 @@ impl Stepping<'_> {
     }
 
     fn next_scheme(&mut self, h: f64, stiffness: f64, evaluations: f64) -> ActiveScheme {
-        let velocities = self.state.now.y.len() - self.mechanism.positions();
+        let velocities = self.mechanism.velocities();
         let factorisations = f64::from(self.attempt.factorisations);
         let state = &mut self.state;
         let scheme = state.control.scheme;
@@ -192,7 +192,7 @@ pub(in crate::simulate) fn controller_of(method: Method, scheme: ActiveScheme) -
 
 /// Allocates the workspace of an implicit method.
 pub(in crate::simulate) fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Result<(), MechanismError> {
-    let velocities = mechanism.dimension() - mechanism.positions();
+    let velocities = mechanism.velocities();
     if mechanism.is_kinematic() {
         return Ok(());
     }

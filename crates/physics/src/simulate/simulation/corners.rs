@@ -16,6 +16,8 @@ const MAXIMUM_AT_START: f64 = 1e-3;
 const LAST_PART: f64 = 1e-4;
 /// A rate that exceeds the largest so far by less than this fraction of it counts as equal.
 const EQUAL_RATES: f64 = 1e-6;
+/// Excess of bristles over their branch that counts as none, m.
+const SMALL_EXCESS: f64 = 1e-16;
 /// Golden-section iterations over the two quarters of a step in which a rate is largest: to 2e-4 of the step.
 const SECTIONS: u32 = 16;
 /// Chatter added by a step that ends at a corner; any other step subtracts one.
@@ -85,8 +87,13 @@ impl Stepping<'_> {
         mechanism.measure(now.t, &now.y);
         for (c, contact_state) in now.contact_states.iter_mut().enumerate() {
             if is_unfrozen(contact_state) {
+                let excess = mechanism.bristle_excess(c, (now.t, &now.y), contact_state, FrictionBranch::Sticking);
                 let law = mechanism.contacts.coefficients(c);
-                contact_state.friction_branch = law.friction_branch_at(mechanism.slip_speed(c));
+                contact_state.friction_branch = match excess {
+                    Some(excess) if excess > 0.0 => FrictionBranch::Sliding,
+                    Some(_) => FrictionBranch::Sticking,
+                    None => law.friction_branch_at(mechanism.slip_speed(c)),
+                };
                 if reset {
                     contact_state.freeze_approach(law, mechanism.contacts.gap(c).separation.rate);
                 }
@@ -187,7 +194,8 @@ impl Stepping<'_> {
         let Self { mechanism, stepper, state, attempt, scratch_y, .. } = self;
         let (now, end) = (&state.now, &attempt.end);
         let all = 0..now.y.len();
-        for part in mechanism.gap_components(c).unwrap_or(std::slice::from_ref(&all)) {
+        let bristles = mechanism.bristles_of(c);
+        for part in mechanism.gap_components(c).unwrap_or(std::slice::from_ref(&all)).iter().chain(&bristles) {
             let part = part.clone();
             stepper.interpolate(part, theta, now.step(h), [&end.y, &end.k], &state.polynomial, scratch_y);
         }
@@ -208,7 +216,8 @@ impl Stepping<'_> {
             let right = (theta, self.slip_excess(c, theta, h).0);
             if right.1 > 0.0 {
                 let at = if left.1 < 0.0 {
-                    let small = 1e-9 * self.mechanism.contacts.coefficients(c).slip_high;
+                    let law = self.mechanism.contacts.coefficients(c);
+                    let small = if law.bristles.is_some() { SMALL_EXCESS } else { 1e-9 * law.slip_high };
                     let width = (1e-15 / h).max(1e-12);
                     let excess = |theta: f64| self.slip_excess(c, theta, h).0;
                     find_root(left.0, left.1, right.0, right.1, width, small, excess)
@@ -220,6 +229,8 @@ impl Stepping<'_> {
                 let next = match self.state.now.contact_states[c].friction_branch {
                     FrictionBranch::Ramp if speed > 0.5 * (law.slip_low + law.slip_high) => FrictionBranch::Full,
                     FrictionBranch::Ramp => FrictionBranch::DeadBand,
+                    FrictionBranch::Sticking => FrictionBranch::Sliding,
+                    FrictionBranch::Sliding => FrictionBranch::Sticking,
                     _ => FrictionBranch::Ramp,
                 };
                 return Some((at, LawBranch::Friction(next)));
@@ -245,13 +256,16 @@ impl Stepping<'_> {
         self.evaluate_end(t_end);
     }
 
-    /// Excess at contact `c`'s sliding speed over its branch, and that speed, m/s, on the interpolant of the attempted step.
+    /// Excess at contact `c`'s sliding speed over its branch, m/s, or of its bristles, m, and that speed, on the interpolant of the
+    /// attempted step.
     fn slip_excess(&mut self, c: usize, theta: f64, h: f64) -> (f64, f64) {
         self.measure_at(c, theta, h);
         let speed = self.mechanism.slip_speed(c);
-        let slip = self.state.now.contact_states[c].friction_branch;
+        let contact_state = &self.state.now.contact_states[c];
+        let (slip, at) = (contact_state.friction_branch, (self.state.now.t + theta * h, &self.scratch_y[..]));
         let law = self.mechanism.contacts.coefficients(c);
-        (law.excess_over_branch(slip, speed), speed)
+        let of_bristles = self.mechanism.bristle_excess(c, at, contact_state, slip);
+        (of_bristles.unwrap_or_else(|| law.excess_over_branch(slip, speed)), speed)
     }
 
     /// After an accepted step: switches to the branch beyond the corner at its end. Stops locating corners for a while if almost

@@ -46,7 +46,7 @@ const SCALE_TIME: f64 = 0.1;
 impl DiscreteControl {
     /// At the start.
     pub(super) fn new(mechanism: &Mechanism) -> Self {
-        Self { h: 0.0, acceleration: vec![0.0; mechanism.dimension() - mechanism.positions()], smooth: LONGEST }
+        Self { h: 0.0, acceleration: vec![0.0; mechanism.velocities()], smooth: LONGEST }
     }
 
     /// Records the step just accepted, of size `h`, that ends at `now`; with `finer` times the steps of the coarse ones.
@@ -59,7 +59,7 @@ impl DiscreteControl {
             }
         }
         // The midpoint rule errs by h^3 / 12 times the rate at which the acceleration changes.
-        let scale = mechanism.scale()[mechanism.positions()..].iter();
+        let scale = mechanism.scale()[mechanism.velocity_range()].iter();
         let accelerations = self.acceleration.iter_mut().zip(mechanism.contact_free_acceleration());
         let mut error = 0.0_f64;
         for ((old, new), scale) in accelerations.zip(scale) {

@@ -69,6 +69,7 @@ impl Stepping<'_> {
             }
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
+            mechanism.begin_bristles(now.t, &now.y);
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
             if self.state.record.wear.is_some() {
@@ -91,6 +92,11 @@ impl Stepping<'_> {
             }
         }
         if has_ledger {
+            // What the bristles store is not lost.
+            let stored = [&self.before.y, &self.state.now.y].map(|y| self.mechanism.bristle_energy(y));
+            if stored != [0.0; 2] {
+                self.state.record.account.course.store_of_friction((stored[1] - stored[0]) / h);
+            }
             self.state.record.account.record_step(h, energies);
         }
     }
@@ -146,6 +152,7 @@ impl Stepping<'_> {
         let located = self.locates();
         let Self { mechanism, stepper, state, before, scratch_y, scratch_k, .. } = self;
         mechanism.forget_evaluation();
+        mechanism.begin_bristles(before.t, &before.y);
         let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
         let powers = evaluator.powers(before.t + theta * h, scratch_y, scratch_k);
         if let Some(wear) = &mut state.record.wear {
@@ -179,7 +186,8 @@ fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let (kinetic, gravitational) = mechanism.energies();
     let contacts = &mechanism.contacts;
     let gaps = state.now.gaps.iter().enumerate();
-    let in_contacts: f64 = gaps.map(|(c, gap)| contacts.coefficients(c).elastic.energy(gap.penetration)).sum();
+    let in_gaps: f64 = gaps.map(|(c, gap)| contacts.coefficients(c).elastic.energy(gap.penetration)).sum();
+    let in_contacts = in_gaps + mechanism.bristle_energy(&state.now.y);
     let elastic = in_contacts + mechanism.energy_in_elements(state.now.t);
     Energies { kinetic, gravitational, elastic, in_contacts }
 }

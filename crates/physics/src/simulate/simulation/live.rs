@@ -84,8 +84,8 @@ impl Stepping<'_> {
     /// As [`Simulation::adopt`](crate::simulate::Simulation::adopt).
     pub(in crate::simulate) fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
         let pairs = self.machine.loose_joints.iter().zip(&next.loose_joints);
-        let loose = |joint: &LooseJoint| joint.contact.clearances().map(|play| play > 0.0);
-        let changes_equations = pairs.into_iter().any(|(a, b)| loose(a) != loose(b));
+        let structure = |joint: &LooseJoint| joint.contact.structure();
+        let changes_equations = pairs.into_iter().any(|(a, b)| structure(a) != structure(b));
         if changes_equations || !self.machine.differs_only_in_conditions(next) {
             return Ok(Effect::AtReset);
         }

@@ -183,8 +183,8 @@ impl Simulation {
         let mut run = Stepping::new(&self.model, &mut state, &mut workspace);
         run.end_flights();
         let (t, y) = (run.state.now.t, run.state.now.y.clone());
-        let nq = run.mechanism.positions();
-        let scale = run.mechanism.scale()[nq..].to_vec();
+        let velocities = run.mechanism.velocity_range();
+        let scale = run.mechanism.scale()[velocities.clone()].to_vec();
         let directions = run.mechanism.free_directions(t, &y);
         let count = directions.ncols();
         let back = directions.clone().pseudo_inverse(1e-12).unwrap_or_else(|_| directions.transpose());
@@ -201,7 +201,7 @@ impl Simulation {
                     let mut moved = y.clone();
                     let step: Vec<f64> = direction.iter().map(|x| sign * size * x).collect();
                     if of_velocity {
-                        moved[nq..].iter_mut().zip(&step).for_each(|(v, step)| *v += step);
+                        moved[velocities.clone()].iter_mut().zip(&step).for_each(|(v, step)| *v += step);
                     } else {
                         run.mechanism.displace(&mut moved, &step);
                     }
@@ -211,7 +211,7 @@ impl Simulation {
                     }
                     let mut dy = vec![0.0; y.len()];
                     run.immediate_derivative(t, &moved, &mut dy);
-                    change += DVector::from_column_slice(&dy[nq..]) * sign;
+                    change += DVector::from_column_slice(&dy[velocities.clone()]) * sign;
                 }
                 let rates = &back * change / (2.0 * size);
                 matrix.view_mut((count, column), (count, 1)).copy_from(&rates);
@@ -230,6 +230,7 @@ impl Stepping<'_> {
     fn immediate_derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.with_all_bodies(|run| {
             let active_set = ActiveSet::Immediate(&run.state.now.contact_states);
+            run.mechanism.begin_bristles(t, y);
             run.mechanism.evaluator(active_set).derivative(t, y, dy);
             run.mechanism.forget_evaluation();
         });

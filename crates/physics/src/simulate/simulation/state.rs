@@ -5,7 +5,7 @@ use super::{
     ContactMemory, Control, DiscreteControl, FIRST_CONTACT_STEP, JointState, LONGEST_STEP, Model, Record, State,
     StateMismatch, StepEnd, WorkspaceId,
 };
-use crate::contact::{ContactPhase, ContactState};
+use crate::contact::{self, ContactPhase, ContactState};
 use crate::integrate::{Polynomial, Step};
 use crate::machine::{AppliedForces, Conditions, LiveElements};
 use crate::mechanism::{ContactId, Flight, Mechanism, Pull};
@@ -253,13 +253,13 @@ impl State {
         let record = &self.record;
         let worn = record.wear.as_ref();
         let conditions = &self.conditions;
-        let loose = |contacts: &Conditions| -> Vec<[bool; 2]> {
-            contacts.joints.iter().map(|contact| contact.clearances().map(|play| play > 0.0)).collect()
+        let structure = |contacts: &Conditions| -> Vec<[bool; 3]> {
+            contacts.joints.iter().map(contact::Parameters::structure).collect()
         };
         let fits = self.now.fits(dimension, contacts)
             && self.quarter_turns.len() == own.quarter_turns.len()
             && record.quarter_turns.len() == own.record.quarter_turns.len()
-            && loose(conditions) == loose(&own.conditions)
+            && structure(conditions) == structure(&own.conditions)
             && self.elements.fits(model.machine())
             && model.machine().with_conditions(conditions, &self.elements).check().is_ok()
             && self.joints.iter().map(|joint| joint.contacts).eq(own.joints.iter().map(|joint| joint.contacts))

@@ -1,0 +1,232 @@
+//! Friction that sticks, against closed forms and an independent model.
+
+use crate::common::{Changes, frame_now, parse, run_until};
+use jointplay_physics::contact::{ElasticLaw, Parameters};
+use jointplay_physics::integrate::Method;
+use jointplay_physics::simulate::{ContactMode, Simulation};
+
+const BRISTLES: (&str, &str) = ("contact.friction_law", "bristle");
+
+/// A free ball of 0.1 kg pressed by its weight onto the wall of its socket at an angle (rad) from the lowest point.
+fn ball_on_wall(angle: f64, changes: &Changes) -> Simulation {
+    let parameters = Parameters::default();
+    let depth = ElasticLaw::of_joint(&parameters, parameters.clearance).depth(0.1 * 9.81 * angle.cos());
+    let distance = 1e3 * (parameters.clearance + depth);
+    let text = format!(
+        r#"
+        [gravity]
+        z = "-9.81 m/s^2"
+        [contact]
+        friction_law = "bristle"
+        friction_velocity = "centres"
+        [[body]]
+        name = "ball"
+        mass = "0.1 kg"
+        inertia = "4e-6 4e-6 4e-6 kg m^2"
+        [[joint]]
+        name = "ball"
+        kind = "free"
+        child = "ball"
+        start = {{ position = "{:e} 0 {:e} mm" }}
+        [[ball_joint]]
+        name = "S"
+        socket = {{ body = "world" }}
+        ball = {{ body = "ball" }}
+        "#,
+        distance * angle.sin(),
+        -distance * angle.cos()
+    );
+    Simulation::new(&parse(&text, changes).machine).unwrap()
+}
+
+
+/// A block of 1 kg and 50 mm of length that lies in a guide with play, `planar`, or hangs in it without gravity.
+fn block(gravity: &str, guide: &str, rest: &str) -> String {
+    format!(
+        r#"
+        [gravity]
+        y = "{gravity}"
+        [contact]
+        friction_law = "bristle"
+        [solver]
+        method = "radau5"
+        tolerance = 1e-8
+        [[body]]
+        name = "block"
+        mass = "1 kg"
+        inertia = "1e-3 1e-3 1e-3 kg m^2"
+        [[joint]]
+        name = "J"
+        kind = "prismatic"
+        child = "block"
+        axis = [1, 0, 0]
+        {guide}
+        play = {{ y = "0.1 mm", half_length = "25 mm", half_y = "1 mm", planar = true }}
+        {rest}
+        "#
+    )
+}
+
+fn run(text: &str, changes: &Changes) -> Simulation {
+    Simulation::new(&parse(text, changes).machine).unwrap()
+}
+
+#[test]
+fn a_loaded_ball_stays_where_it_is() {
+    for method in Method::ALL {
+        let mut simulation = ball_on_wall(2.0_f64.to_radians(), &[BRISTLES, ("solver.method", method.word())]);
+        run_until(&mut simulation, 0.5);
+        let before = frame_now(&mut simulation);
+        assert_eq!(before.joints[0].state, ContactMode::Stick);
+        run_until(&mut simulation, 1.0);
+        let moved = (frame_now(&mut simulation).joints[0].eccentricity - before.joints[0].eccentricity).norm();
+        assert!(moved < 1e-10, "{method}: {moved:e} m");
+    }
+}
+
+/// Where a point that starts at rest at the angle `from` of a circle stops, by Runge-Kutta steps of its speed squared over g c:
+/// dw = 2 (sin a - mu (cos a + w)) along the way down.
+fn stop_on_circle(from: f64, friction: f64) -> f64 {
+    let rate = |angle: f64, w: f64| 2.0 * (angle.sin() - friction * (angle.cos() + w));
+    let (mut angle, mut w, h) = (from, 0.0, 1e-6);
+    loop {
+        let a = rate(angle, w);
+        let b = rate(angle - 0.5 * h, w + 0.5 * h * a);
+        let c = rate(angle - 0.5 * h, w + 0.5 * h * b);
+        let d = rate(angle - h, w + h * c);
+        w += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+        angle -= h;
+        if w <= 0.0 {
+            return angle;
+        }
+    }
+}
+
+/// 8.53 degrees hold it: it slides until friction has taken its energy, below that angle.
+#[test]
+fn a_ball_beyond_its_friction_angle_slides_to_where_its_energy_ends() {
+    for method in Method::ALL {
+        for from in [10.0_f64, 12.0] {
+            let mut simulation = ball_on_wall(from.to_radians(), &[BRISTLES, ("solver.method", method.word())]);
+            run_until(&mut simulation, 0.3);
+            let frame = frame_now(&mut simulation);
+            assert_eq!(frame.joints[0].state, ContactMode::Stick, "{method}");
+            let e = frame.joints[0].eccentricity;
+            let (end, expected) = ((-e.x / e.z).atan(), stop_on_circle(from.to_radians(), 0.15));
+            let off = (end - expected).to_degrees().abs();
+            println!("{method} from {from}: {off}");
+            assert!(off < 0.01, "{method} from {from}: {end} rad, expected {expected}");
+        }
+    }
+    assert!((stop_on_circle(8.54_f64.to_radians(), 0.15).to_degrees() - 8.53 * 2.0 + 8.54).abs() < 0.01);
+}
+
+#[test]
+fn a_block_breaks_away_at_the_static_limit() {
+    let load = "[[load]]\nname = \"push\"\non = { body = \"block\" }\nforce = \"1 0 0 N\"\n\
+        factor = { law = \"table\", interpolation = \"linear\", points = [[\"0 s\", 0], [\"1 s\", 4]] }";
+    let limit = 0.15 * 1.5 * 9.81;
+    for method in Method::ALL {
+        let changes = [("contact.static_friction_ratio", "1.5"), ("solver.method", method.word())];
+        let mut simulation = run(&block("-9.81 m/s^2", "", load), &changes);
+        run_until(&mut simulation, 0.5);
+        assert_eq!(frame_now(&mut simulation).joints[0].state, ContactMode::Stick, "{method}");
+        while frame_now(&mut simulation).joints[0].state == ContactMode::Stick {
+            simulation.step_until(simulation.time() + 1e-4).unwrap();
+        }
+        let force = 4.0 * simulation.time();
+        println!("{method}: {force} {limit}");
+        assert!((force / limit - 1.0).abs() < 2e-3, "{method}: {force} N, not {limit}");
+    }
+}
+
+#[test]
+fn a_slide_pushed_far_from_its_guide_wedges() {
+    // Two walls press with P b / L each, and hold 2 mu P b / L: all of P from b = L / (2 mu) on, 83.3 mm.
+    for method in Method::ALL {
+        for (arm, holds) in [(82.0, false), (85.0, true)] {
+            let load = format!(
+                "[[load]]\nname = \"push\"\non = {{ body = \"block\", at = \"0 {arm} 0 mm\" }}\nforce = \"1 0 0 N\"\n\
+                factor = {{ law = \"table\", points = [[\"0 s\", 0], [\"0.5 s\", 10]] }}"
+            );
+            let mut simulation = run(&block("0 m/s^2", "friction = 0.3", &load), &[("solver.method", method.word())]);
+            run_until(&mut simulation, 0.6);
+            let before = frame_now(&mut simulation).bodies[0].position.x;
+            run_until(&mut simulation, 1.0);
+            let frame = frame_now(&mut simulation);
+            let moved = frame.bodies[0].position.x - before;
+            println!("{method} {arm}: {:?} {moved:e}", frame.joints[0].state);
+            if holds {
+                assert!(moved.abs() < 1e-9, "{method} {arm}: {moved:e} m");
+            } else {
+                assert!(moved > 1e-2, "{method} {arm}: {moved:e} m");
+            }
+        }
+    }
+}
+
+/// Period, largest and least position of a block of 1 kg on a belt of speed `v` behind a spring `k`, from its reduced equation
+/// m x'' = -k x + mu(v - x') N with rigid sticking, by steps of the classical Runge-Kutta method.
+fn stick_slip(v: f64, k: f64, normal: f64, kinetic: f64, ratio: f64, stribeck: f64) -> [f64; 3] {
+    let coefficient = |slip: f64| kinetic * (1.0 + (ratio - 1.0) * (-(slip / stribeck).powi(2)).exp());
+    let rate = |x: f64, u: f64| [u, -k * x + coefficient(v - u) * normal];
+    let breaks = ratio * kinetic * normal / k;
+    let (mut x, mut u, mut slipping, h) = (breaks, v, 0.0, 1e-6);
+    let (mut highest, mut lowest) = (x, x);
+    while u < v || slipping < 1e-3 {
+        let a = rate(x, u);
+        let b = rate(x + 0.5 * h * a[0], u + 0.5 * h * a[1]);
+        let c = rate(x + 0.5 * h * b[0], u + 0.5 * h * b[1]);
+        let d = rate(x + h * c[0], u + h * c[1]);
+        x += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]);
+        u += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]);
+        slipping += h;
+        (highest, lowest) = (highest.max(x), lowest.min(x));
+    }
+    [slipping + (breaks - x) / v, highest, lowest]
+}
+
+#[test]
+fn a_block_on_a_belt_sticks_and_slips_as_in_an_independent_model() {
+    let (v, k) = (0.05, 200.0);
+    let belt = "parent = \"belt\"";
+    let rest = "[[body]]\nname = \"belt\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+        [[joint]]\nname = \"B\"\nkind = \"prismatic\"\nchild = \"belt\"\naxis = [1, 0, 0]\n\
+        drive = { law = \"constant\", velocity = \"50 mm/s\" }\n\
+        [[bushing]]\nname = \"spring\"\nfrom = { body = \"world\" }\nto = { body = \"block\" }\nstiffness = \"200 0 0 N/m\"";
+    let expected = stick_slip(v, k, 9.81, 0.15, 1.6, 2e-3);
+    for method in Method::ALL {
+        let changes = [
+            ("contact.static_friction_ratio", "1.6"),
+            ("contact.stribeck_speed", "2 mm/s"),
+            ("solver.method", method.word()),
+        ];
+        let mut simulation = run(&block("-9.81 m/s^2", belt, rest), &changes);
+        let mut time = 0.9;
+        run_until(&mut simulation, time);
+        // Positions every 0.1 ms, from which the turning points follow by parabolas.
+        let mut x = Vec::new();
+        while time < 2.5 {
+            x.push(-frame_now(&mut simulation).elements[0].force.x / k);
+            time += 1e-4;
+            run_until(&mut simulation, time);
+        }
+        let turn = |i: usize| {
+            let (a, b) = (0.5 * (x[i + 1] - x[i - 1]), x[i + 1] - 2.0 * x[i] + x[i - 1]);
+            (0.9 + (i as f64 - a / b) * 1e-4, x[i] - 0.5 * a * a / b)
+        };
+        let tops: Vec<(f64, f64)> =
+            (1..x.len() - 1).filter(|&i| x[i] > 0.012 && x[i] > x[i - 1] && x[i] >= x[i + 1]).map(turn).collect();
+        assert_eq!(tops.len(), 3, "{method}: {tops:?}");
+        let lowest = x.iter().copied().fold(f64::INFINITY, f64::min);
+        let period = 0.5 * (tops[2].0 - tops[0].0);
+        let found = [period, tops[1].1, lowest];
+        println!("{method}: {found:?} {expected:?}");
+        let allowed = if method == Method::DiscreteGradient { 1e-3 } else { 1e-4 };
+        for (i, scale) in [expected[0], expected[1], expected[1]].into_iter().enumerate() {
+            assert!((found[i] - expected[i]).abs() < allowed * scale, "{method}: {found:?} {expected:?}");
+        }
+        let ledger = frame_now(&mut simulation).ledger.expect("on");
+        assert!(ledger.relative_residual().abs() < 1e-4, "{method}: {:e}", ledger.relative_residual());
+    }
+}
