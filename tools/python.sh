@@ -6,6 +6,8 @@ python_env=target/python
 # Prepares that environment. Fails if there is no Python that can create one.
 prepare_python() {
     python3 -c 'import ensurepip, venv' 2> /dev/null || prepare_packages python3 python3-venv
+    # For pyright.
+    command -v node > /dev/null || prepare_packages nodejs
     cmp -s python/requirements.txt "$python_env/.from" && return
     say "installing the packages of the Python tests"
     python3 -m venv --clear "$python_env"
@@ -35,13 +37,23 @@ build_wheel() {
     "$1/bin/maturin" build --quiet --locked --manifest-path "$root/python/Cargo.toml" --out "${@:2}"
 }
 
+# Checks the types of the package, and of the examples of its document as a user's script.
+python_types() {
+    local examples=$python_env/examples.py
+    sed -n '/^```python$/,/^```$/{/^```/!p;}' docs/python.md > "$examples"
+    "$python_env/bin/mypy" --strict --no-error-summary --cache-dir "$python_env/.mypy" python/jointplay "$examples"
+    # Without a search for a newer version.
+    PYRIGHT_PYTHON_IGNORE_WARNINGS=1 "$python_env/bin/pyright" --project python --warnings --pythonpath "$python_env/bin/python" \
+        python/jointplay "$examples"
+}
+
 # Builds the wheel, installs it as a user would, and tests it.
 python_test() {
     local wheels=$python_env/wheels
     rm -rf "$wheels"
     build_wheel "$python_env" "$wheels" --profile dev --features alike
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall "$wheels"/*.whl
-    "$python_env/bin/mypy" --strict --no-error-summary --cache-dir "$python_env/.mypy" python/jointplay
+    python_types
     # -P: without the current folder in the path, the installed package is tested.
     "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests "$@"
     # `./run lab` forwards to it.

@@ -9,11 +9,11 @@ Quantities are floats in SI units, or text with a unit ("0.5 mm"). The same scen
 program `jointplay`: compare `Run.hash` with the state hash that `jointplay run` prints.
 """
 
+from . import _native
 from ._compare import Comparison, compare
 from ._control import Elements, Linearisation, Load, Motor, Spring
 from ._fit import FitStart, ParameterFit, fit
 from ._geometry import Shape
-from ._native import State, __version__
 from ._render import render
 from ._scene import Channel, Check, Parameter, Quantity, Run, Scene
 from ._sensitivity import Changes, Effects, Ends, Indices, Sensitivity, Target, sensitivity
@@ -33,6 +33,9 @@ from .errors import (
     SceneError,
     Stopped,
 )
+
+State = _native.State
+__version__ = _native.__version__
 
 __all__ = [
     "Changes",

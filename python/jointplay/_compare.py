@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._options import library
+from ._scene import Run, explain, recorded
 from ._table import read_cells
 from .errors import ChannelError, OptionError
 
 if TYPE_CHECKING:
     import pandas
-
-    from ._scene import Run
 
 Array = NDArray[np.float64]
 Measured = str | os.PathLike[str] | Mapping[str, Any]
@@ -97,8 +96,7 @@ def compare(
     forwards and backwards: without a delay, and with half the amplitude at the cut-off. Between its rows the run is interpolated
     linearly.
     """
-    known = {text: name for name, column, _, _ in run._channels for text in (name, column)}
-    time, values = read_measured(measured, known, channels, run._explain)
+    time, values = read_measured(measured, recorded(run), channels, lambda name: explain(run, name))
     computed = {name: run[name] for name in values}
     if cutoff is not None:
         time, values = filtered("measured", time, values, cutoff)
@@ -144,7 +142,7 @@ def _pearson(a: Array, b: Array) -> float:
 
 
 def read_measured(
-    measured: Measured, known: Mapping[str, str], channels: Sequence[str] | None, explain: Any
+    measured: Measured, known: Mapping[str, str], channels: Sequence[str] | None, explain: Callable[[str], str]
 ) -> tuple[Array, dict[str, Array]]:
     """Times, s, and values by channel. `known` has the channels by name and column; `explain` says why one is not known."""
     if isinstance(measured, (str, os.PathLike)):

@@ -40,18 +40,18 @@ class Element:
         except TypeError:
             raise OptionError(f"{number} of {self.name} = {value!r}: expected a number in SI units") from None
 
+    @staticmethod
+    def _number(number: str, doc: str) -> Any:
+        def read(self: Element) -> float:
+            return self._get(number)
+
+        def write(self: Element, value: float) -> None:
+            self._set(number, value)
+
+        return property(read, write, doc=doc)
+
     def __repr__(self) -> str:
         return f"<jointplay.{type(self).__name__} {self.name}>"
-
-
-def _number(number: str, doc: str) -> Any:
-    def read(self: Element) -> float:
-        return self._get(number)
-
-    def write(self: Element, value: float) -> None:
-        self._set(number, value)
-
-    return property(read, write, doc=doc)
 
 
 class Motor(Element):
@@ -83,11 +83,11 @@ class Motor(Element):
     def force(self, value: float) -> None:
         self._set(self._of(False), value)
 
-    stiffness: float = _number("stiffness", "Gain on the distance from the target, N/m or N m/rad.")
-    damping: float = _number("damping", "Gain on the difference from the target's rate, N s/m or N m s/rad.")
-    limit: float = _number("limit", "Largest force or torque, N or N m; `math.inf` for none.")
-    target: float = _number("target", "Where the target is now, m or rad. It moves on from there at `target_rate`.")
-    target_rate: float = _number("target_rate", "Rate of the target, m/s or rad/s.")
+    stiffness: float = Element._number("stiffness", "Gain on the distance from the target, N/m or N m/rad.")
+    damping: float = Element._number("damping", "Gain on the difference from the target's rate, N s/m or N m s/rad.")
+    limit: float = Element._number("limit", "Largest force or torque, N or N m; `math.inf` for none.")
+    target: float = Element._number("target", "Where the target is now, m or rad. It moves on from there at `target_rate`.")
+    target_rate: float = Element._number("target_rate", "Rate of the target, m/s or rad/s.")
 
 
 class Spring(Element):
@@ -95,11 +95,11 @@ class Spring(Element):
 
     __slots__ = ()
 
-    stiffness: float = _number("stiffness", "N/m, or N m/rad on a hinge.")
-    damping: float = _number("damping", "N s/m, or N m s/rad on a hinge.")
-    preload: float = _number("preload", "Tension at `length`, or force towards lower coordinates at `position`, N or N m.")
-    length: float = _number("length", "Distance of the points without stretch, m; of a spring between two points.")
-    position: float = _number("position", "Coordinate without stretch, m or rad; of a spring on a joint.")
+    stiffness: float = Element._number("stiffness", "N/m, or N m/rad on a hinge.")
+    damping: float = Element._number("damping", "N s/m, or N m s/rad on a hinge.")
+    preload: float = Element._number("preload", "Tension at `length`, or force to lower coordinates at `position`, N or N m.")
+    length: float = Element._number("length", "Distance of the points without stretch, m; of a spring between two points.")
+    position: float = Element._number("position", "Coordinate without stretch, m or rad; of a spring on a joint.")
 
 
 class Load(Element):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _iso286, _native
-from ._options import library
+from ._options import is_a, library
 from ._scene import Scene
 from .errors import JointplayError, OptionError
 
@@ -42,7 +43,8 @@ class At:
             raise OptionError(f"{self.place}: {error}") from error
 
 
-class Distribution(NamedTuple):
+@dataclass(frozen=True)
+class Distribution:
     """Distribution of one parameter, SI."""
 
     low: float
@@ -167,12 +169,12 @@ class Request(NamedTuple):
 def resolve(scene: Scene, request: Request) -> dict[str, Distribution]:
     """Distribution of each parameter of `scene` that a request names."""
     with At(request.place):
-        keys = _native.matching_keys(scene._native, request.pattern)
+        keys = _native.matching_keys(scene.native, request.pattern)
         diameters = {}
         if isinstance(request.text, str) and re.fullmatch(r"\s*[A-Za-z]+\d+\s*/.*", request.text):
             diameters = {key: size for name in keys for key, size in _diameters(scene, name).items()}
             keys = list(diameters)
-        found = {}
+        found: dict[str, Distribution] = {}
         for key in keys:
             with At(key):
                 one = found[key] = _of_parameter(scene, key, request.text, diameters.get(key))
@@ -214,7 +216,7 @@ def _of_parameter(scene: Scene, key: str, text: str | None, diameter: float | No
     parameter = scene.parameter(key)
     if not isinstance(parameter.value, float) or parameter.range is None:
         raise OptionError("its values are not real numbers")
-    if text is not None and not isinstance(text, str):
+    if text is not None and not is_a(text, str):
         raise OptionError(f"{text!r} is not a distribution: expected text, {FORMS}")
     if text is None:
         low, high = sorted(float(np.clip(part * parameter.value, *parameter.range)) for part in DEFAULT_RANGE)
@@ -229,4 +231,4 @@ def _of_parameter(scene: Scene, key: str, text: str | None, diameter: float | No
             raise OptionError(f"a fit gives a clearance, and {key} is none")
         return radial_clearance(name, diameter)
 
-    return parse(text, lambda part: _native.read_number(scene._native, key, part), fit)
+    return parse(text, lambda part: _native.read_number(scene.native, key, part), fit)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
+from functools import partial
 from threading import Event
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -81,7 +82,7 @@ class _Model:
         is_known = self.low[-1] == self.high[-1]
         self.free = len(ranges) - int(is_known)
         times, step = self.time + self.high[-1], float(np.median(np.diff(self.time)))
-        is_at_rows = is_known and np.allclose(times / step, np.round(times / step), rtol=0.0, atol=1e-6)
+        is_at_rows = is_known and np.allclose(times / step, (times / step).round(), rtol=0.0, atol=1e-6)
         self.every = step if is_at_rows else step / FINER
         self.duration = float(times[-1]) + 0.5 * self.every
         self.scales = {name: float(values.std()) or 1.0 for name, values in measured.items()}
@@ -116,7 +117,7 @@ class _Model:
 
     def jacobian(self, u: Array, step: float) -> Array:
         """Derivatives of the residuals, by differences over `step` of each range to both sides, within it."""
-        columns = []
+        columns: list[Array] = []
         for i in range(len(u)):
             ends = np.clip([u[i] - step, u[i] + step], 0.0, 1.0)
             low, high = (self.residuals(np.where(np.arange(len(u)) == i, end, u)) for end in ends)
@@ -127,7 +128,7 @@ class _Model:
         """The minimum that SciPy finds from a start."""
         solve = library("scipy.optimize").least_squares
         return solve(
-            self.residuals, start, lambda u: self.jacobian(u, step), bounds=(0.0, 1.0), x_scale=1.0, xtol=1e-9, ftol=1e-9
+            self.residuals, start, partial(self.jacobian, step=step), bounds=(0.0, 1.0), x_scale=1.0, xtol=1e-9, ftol=1e-9
         )
 
 
@@ -221,7 +222,7 @@ def _search(minimum: Callable[[Array], Any], places: Array, threads: int, progre
 
 def _errors(refined: Any, jacobian: Array, cutoff: float | None, time: Array) -> tuple[Array, Array]:
     """Half widths of the intervals, as parts of the ranges, and correlations of the errors."""
-    n, k = jacobian.shape
+    n, k = map(int, jacobian.shape)
     rate = 1.0 / float(np.median(np.diff(time)))
     independent = n if cutoff is None else n * min(1.0, 2.0 * cutoff / rate)
     free = max(independent - k, 1.0)
@@ -229,7 +230,7 @@ def _errors(refined: Any, jacobian: Array, cutoff: float | None, time: Array) ->
     if not sizes[-1] > 1e-9 * sizes[0]:
         return np.full(k, np.inf), np.full((k, k), np.nan)
     # Each of the independent samples counts as n / independent of those here.
-    covariance = 2.0 * refined.cost / free * np.linalg.inv(jacobian.T @ jacobian)
-    deviation = np.sqrt(np.diag(covariance))
+    covariance: Array = 2.0 * refined.cost / free * np.linalg.inv(jacobian.T @ jacobian)
+    deviation: Array = np.sqrt(np.diag(covariance))
     student = float(library("scipy.stats").t.ppf(0.5 + 0.5 * CONFIDENCE, free))
     return student * deviation, covariance / np.outer(deviation, deviation)

@@ -77,7 +77,7 @@ class Search:
         self._loosen(tightest)
         loosest = (0,) * len(tightest)
         # Only parameters from the third entry on may still be tightened, so that each choice is visited once.
-        nodes = [(self.cost(loosest), loosest, 0)]
+        nodes: list[tuple[float, Choice, int]] = [(self.cost(loosest), loosest, 0)]
         for _ in range(MAX_CHOICES):
             if not nodes:
                 return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ def check_replaceable(out: Path, force: bool) -> None:
         raise OptionError(f"--out {out}: the folder is not empty; --force replaces earlier results")
     try:
         manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
-        listed = {MANIFEST, *manifest["files"]} if manifest["program"] == "jointplay" else set()
+        listed: set[str] = {MANIFEST, *manifest["files"]} if manifest["program"] == "jointplay" else set()
     except (OSError, ValueError, KeyError, TypeError):
         listed = set()
     if foreign := sorted(content - listed):
@@ -41,7 +41,7 @@ def files_in(folder: Path) -> set[str]:
 
 
 @contextmanager
-def result_folder(out: Path, force: bool, meta: Mapping[str, Any]) -> Iterator[Path]:
+def result_folder(out: Path, force: bool, meta: Mapping[str, Any]) -> Generator[Path]:
     """An empty folder, which is renamed to `out` in the end, with a manifest of `meta` and the names of its files."""
     with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.resolve().parent) as beside:
         folder = Path(beside) / "new"

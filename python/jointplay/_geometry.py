@@ -39,7 +39,7 @@ def shapes_of(scene: _native.Scene) -> list[Shape]:
 def _shape(body: str, kind: str, numbers: dict[str, Any]) -> Shape:
     if kind == "mesh":
         return Shape(body, kind, {}, numbers["vertices"], numbers["faces"])
-    own = {name: np.asarray(value) if isinstance(value, list) else value for name, value in numbers.items()}
+    own: dict[str, Any] = {name: np.asarray(value) if np.ndim(value) else value for name, value in numbers.items()}
     if kind == "plate":
         return Shape(body, kind, own, *_plate(own["corners"], own.pop("triangles"), float(numbers["thickness"])))
     if kind == "box":
@@ -48,7 +48,7 @@ def _shape(body: str, kind: str, numbers: dict[str, Any]) -> Shape:
         faces = np.array([[a, *pair] for a, b, c, d in sides for pair in ((b, c), (c, d))])
         return Shape(body, kind, own, own["centre"] + 0.5 * signs * own["size"], faces)
     # Height along the axis and distance from it, of the ends and of the rings between them.
-    radius = own["radius"]
+    radius = float(own["radius"])
     start = own["centre"] if kind == "sphere" else own["from"]
     axis = np.array([0.0, 0.0, 0.0]) if kind == "sphere" else own["to"] - start
     length = float(np.linalg.norm(axis))

@@ -21,16 +21,21 @@ def library(name: str, extra: str = "studies") -> ModuleType:
         raise OptionError(f"needs {missing}: pip install 'jointplay[{extra}]'") from error
 
 
+def is_a(value: object, *kinds: type) -> bool:
+    """Whether an argument has a type that it should have: its caller may use no type checker."""
+    return isinstance(value, kinds)
+
+
 def whole(name: str, value: int, least: int, most: int, more: str = "") -> int:
     """A whole number within its range."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= most:
+    if isinstance(value, bool) or not is_a(value, int, np.integer) or not least <= value <= most:
         raise OptionError(f"{name} = {value!r}: allowed whole numbers from {least} to {most}{more}")
     return int(value)
 
 
 def workers(threads: int | None) -> int:
     """Number of threads; None and -1 stand for one per core."""
-    if threads is None or (threads == -1 and not isinstance(threads, bool)):
+    if threads is None or threads == -1:
         return os.cpu_count() or 1
     return whole("threads", threads, 1, 1024, ", or -1 for one per core")
 

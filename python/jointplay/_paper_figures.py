@@ -1,8 +1,12 @@
 """The figures of the paper and the additional ones."""
 
+# Most of Matplotlib's methods take named arguments that have no types.
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -40,12 +44,13 @@ STYLE: Any = {
 }
 
 
-def drawn(findings: Findings) -> Iterator[tuple[str, Figure]]:
-    """Every figure by its name, in the order of the page."""
+def write_figures(folder: Path, findings: Findings) -> None:
+    """Writes every figure, in the order of the page."""
     for section in PAPER["section"]:
         for row in section["figure"]:
             with mpl.rc_context(STYLE):
-                yield row["name"], FIGURES[row["shows"]](findings, **row.get("with", {}))
+                figure = FIGURES[row["shows"]](findings, **row.get("with", {}))
+                figure.savefig(folder / f"{row['name']}.png", dpi=150)
 
 
 def sheet(rows: int, columns: int) -> tuple[Figure, list[list[Axes]]]:
@@ -186,7 +191,8 @@ def sections(findings: Findings, over: str) -> Figure:
         for n, (run, colour) in enumerate(zip(SERIES[over].runs, COLOURS, strict=True)):
             values, rates = (points.sections[column][n] / COLUMNS[column].size for column in columns[:2])
             place.plot(values, rates, "os^"[n], color=colour, mfc="none", ms=6, label=SERIES[over].name(run))
-        place.set(title=f"{len(values)} sections each", xlabel=label_of(columns[0]), ylabel=label_of(columns[1]))
+        count = points.sections[columns[0]].shape[1]
+        place.set(title=f"{count} sections each", xlabel=label_of(columns[0]), ylabel=label_of(columns[1]))
         place.margins(0.15)
         place.locator_params(axis="x", nbins=5)
         place.legend()
@@ -239,7 +245,7 @@ def exponents(findings: Findings, over: str) -> Figure:
     legible = np.flatnonzero(points.exponents > MIN_EXPONENT)
     shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.85, 5))
     for point, colour in zip(legible[np.linspace(0, len(legible) - 1, min(5, len(legible))).astype(int)], shades, strict=False):
-        periods = discard + 1 + np.arange(running.shape[1])
+        periods = discard + 1 + np.arange(int(running.shape[1]))
         axes[1].plot(periods, running[point], color=colour, label=series.value.format(float(f"{points.values[point]:.3g}")))
     axes[1].set(title="Convergence", xlabel="Periods run")
     axes[1].legend()

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._paper_figures import BRANCHES, drawn
+from ._paper_figures import BRANCHES, write_figures
 from ._paper_results import (
     COLUMNS,
     DERIVATIVES,
@@ -67,8 +67,7 @@ def write_report(folder: Path, findings: Findings) -> tuple[list[Comparison], li
     (folder / "plots").mkdir()
     compared, stated = comparisons(findings), statements(findings)
     write_data(folder / "data", findings, compared, stated)
-    for name, figure in drawn(findings):
-        figure.savefig(folder / "plots" / f"{name}.png", dpi=150)
+    write_figures(folder / "plots", findings)
     (folder / "index.html").write_text(page(findings, compared, stated), encoding="utf-8")
     return compared, stated
 
@@ -192,7 +191,7 @@ def tables_of(figure: dict[str, Any], findings: Findings, compared: list[Compari
 
 def strongest(figures: list[str], compared: list[Comparison]) -> str:
     """The largest force of any joint, which depends less on which joint is hit first."""
-    rows = []
+    rows: list[list[str]] = []
     for figure in figures:
         own = [c for c in compared if c.published.figure == figure and "contact force" in c.published.quantity]
         paper, here = max(c.published.value for c in own), max(c.full for c in own)
@@ -207,8 +206,9 @@ def strongest(figures: list[str], compared: list[Comparison]) -> str:
 def verification(findings: Findings) -> str:
     """Peaks of Figure 17, and of the contact forces, in both formulations."""
     records = [next(iter(findings.runs.values())), findings.lagrange]
-    peaks = [*PAPER["verification"], *(["", f"largest contact force in {joint}", np.nan, np.nan] for joint in JOINTS)]
-    rows = []
+    forces = [("", f"largest contact force in {joint}", np.nan, np.nan) for joint in JOINTS]
+    peaks: list[tuple[str, str, float, float]] = [*PAPER["verification"], *forces]
+    rows: list[list[str]] = []
     for figure, quantity, own, commercial in peaks:
         ours = [value for record in records for value in (record.value(quantity), record.sampled(quantity))]
         rows.append([figure, f"{quantity} ({QUANTITIES[quantity][0]})", *map(number, [own, commercial, *ours])])
@@ -221,7 +221,8 @@ def verification(findings: Findings) -> str:
 
 def sections(findings: Findings, over: str) -> str:
     """Regime, exponent and sections of three runs."""
-    points, rows = findings.points[f"runs_by_{over}"], []
+    points = findings.points[f"runs_by_{over}"]
+    rows: list[list[str]] = []
     for k, run in enumerate(SERIES[over].runs):
         row = [SERIES[over].name(run), points.regimes[k], f"{number(points.exponents[k])} ± {number(points.errors[k], 2)}"]
         for coordinate in DERIVATIVES:
@@ -232,7 +233,8 @@ def sections(findings: Findings, over: str) -> str:
 
 def branches(findings: Findings, over: str) -> str:
     """Largest distance of each followed branch from the cold starts."""
-    cold, rows = findings.points[f"{over}_cold"], []
+    cold = findings.points[f"{over}_cold"]
+    rows: list[list[str]] = []
     for branch in ("up", "down"):
         other = findings.points[f"{over}_{branch}"]
         most = {c: float(np.abs(cold.latest(c) - other.latest(c)).max()) for c in DERIVATIVES}
@@ -274,7 +276,8 @@ def page(findings: Findings, compared: list[Comparison], stated: list[Statement]
     """The whole page."""
     counts = [sum(c.agreement == word for c in compared) for word in AGREEMENTS]
     confirmed = sum(s.verdict.confirmed for s in stated)
-    contents, body = [], []
+    contents: list[str] = []
+    body: list[str] = []
     for section in PAPER["section"]:
         entries = [f'<li><a href="#{row["name"]}">{escape(row["heading"])}</a></li>' for row in section["figure"]]
         contents.append(f'<li><a href="#{section["id"]}">{escape(section["title"])}</a><ol>{"".join(entries)}</ol></li>')
@@ -303,7 +306,7 @@ def page(findings: Findings, compared: list[Comparison], stated: list[Statement]
         "STATEMENTS": table("Place | Statement | Criterion | Verdict | Evidence", rows),
         "PROVENANCE": provenance(findings),
     }
-    text = resources.files(__package__).joinpath("paper.html").read_text(encoding="utf-8")
+    text = resources.files("jointplay").joinpath("paper.html").read_text(encoding="utf-8")
     for gap, content in gaps.items():
         text = text.replace("{" + gap + "}", content)
     return text

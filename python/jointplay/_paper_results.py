@@ -74,13 +74,15 @@ class Published(NamedTuple):
     """The number, SI."""
 
 
-PAPER: dict[str, Any] = tomllib.loads(resources.files(__package__).joinpath("paper.toml").read_text(encoding="utf-8"))
+PAPER: dict[str, Any] = tomllib.loads(resources.files("jointplay").joinpath("paper.toml").read_text(encoding="utf-8"))
 """The table of the paper."""
 PERIOD: float = PAPER["period"]
 """Period of the drives, s."""
 RUNS: list[Case] = [(run[0], run[1]) for run in PAPER["runs"]]
 """The paper's runs; the first one is the nominal one."""
-SERIES = {name: Series(**{**row, "runs": tuple(map(tuple, row["runs"]))}) for name, row in PAPER["series"].items()}
+SERIES = {
+    name: Series(**(row | {"runs": tuple((run[0], run[1]) for run in row["runs"])})) for name, row in PAPER["series"].items()
+}
 """The two series of runs, over clearance and over friction."""
 NUMBERS = [Published(figure, tuple(run), quantity, value) for figure, run, quantity, value in PAPER["number"]]
 """Every number of section 4.2 whose run is named."""
@@ -185,7 +187,7 @@ class Record:
     def time(self) -> Array:
         """Time of each row, s."""
         rows = len(self.columns["x_m"])
-        return np.linspace(0.0, (rows - 1) * PAPER["sampling"] / self.stride, rows)
+        return np.linspace(0.0, (rows - 1) * float(PAPER["sampling"]) / self.stride, rows)
 
     def value(self, quantity: str) -> float:
         """A quantity in continuous time, SI; NaN if there is none."""

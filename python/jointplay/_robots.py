@@ -7,11 +7,12 @@ import os
 import re
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -21,13 +22,11 @@ from . import _native
 from ._options import write
 from .errors import OptionError, SceneError
 
-if TYPE_CHECKING:
-    import mujoco  # type: ignore[import-untyped]
-else:
-    try:
-        import mujoco
-    except ImportError:
-        mujoco = None
+try:
+    # It has no types.
+    mujoco: Any = import_module("mujoco")
+except ImportError:
+    mujoco = None
 
 _Array = NDArray[np.float64]
 _Keys = dict[str, object]
@@ -52,11 +51,11 @@ class Description:
     """Its name in messages."""
     is_urdf: bool = False
     """Whether it is a URDF."""
-    notes: dict[str, list[str]] = field(default_factory=dict)
+    notes: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     """Names of elements by what the scene does not have of them."""
-    massless: set[str] = field(default_factory=set)
+    massless: set[str] = field(default_factory=set[str])
     """Links without mass."""
-    moments: dict[str, _Array] = field(default_factory=dict)
+    moments: dict[str, _Array] = field(default_factory=dict[str, _Array])
     """Given principal moments of inertia by name of body, in rising order, kg m^2."""
 
     def note(self, what: str, element: str) -> None:
@@ -105,28 +104,32 @@ def scene_of(source: str | os.PathLike[str], kind: str | None, folder: str | Non
 
 
 @contextmanager
-def _warnings_into(description: Description) -> Iterator[None]:
+def _warnings_into(description: Description) -> Generator[None]:
     """Notes MuJoCo's warnings, which it would print and append to a file in the current folder."""
+
+    def note(text: object) -> None:
+        description.note("MuJoCo", " ".join(str(text).split()))
+
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: description.note("MuJoCo", " ".join(str(text).split())))
+    mujoco.set_mju_user_warning(note)
     try:
         with warnings.catch_warnings(record=True) as found:
             warnings.simplefilter("always")
             yield
         for one in found:
-            description.note("MuJoCo", " ".join(str(one.message).split()))
+            note(one.message)
     finally:
         mujoco.set_mju_user_warning(before)
 
 
-def _mjcf(description: Description, text: str, path: Path | None) -> mujoco.MjModel:
+def _mjcf(description: Description, text: str, path: Path | None) -> Any:
     try:
         return _compiled(description, mujoco.MjSpec.from_file(str(path)) if path else mujoco.MjSpec.from_string(text))
     except ValueError as error:
         raise _fault(description, str(error), "<include" in text) from error
 
 
-def _compiled(description: Description, spec: mujoco.MjSpec) -> mujoco.MjModel:
+def _compiled(description: Description, spec: Any) -> Any:
     """The compiled model; remembers the given inertias."""
     for body in spec.bodies:
         if body.explicitinertial:
@@ -155,7 +158,7 @@ def _fault(description: Description, message: str, has_includes: bool = False) -
     return description.refused(words, line)
 
 
-def _urdf(description: Description, text: str, path: Path | None) -> mujoco.MjModel:
+def _urdf(description: Description, text: str, path: Path | None) -> Any:
     """Compiles a URDF: with the meshes that are found, links without mass, and impossible inertias balanced."""
     description.is_urdf = True
     try:
@@ -272,10 +275,10 @@ def _exact(value: ArrayLike) -> _Array:
 
 def _toml(value: object) -> str:
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in cast(_Keys, value).items()) + " }"
     if isinstance(value, list):
-        return "[\n    " + ",\n    ".join(_toml(part) for part in value) + ",\n]"
-    return json.dumps(_exact(value).tolist() if isinstance(value, np.ndarray) else value)
+        return "[\n    " + ",\n    ".join(_toml(part) for part in cast(list[object], value)) + ",\n]"
+    return json.dumps(_exact(cast(_Array, value)).tolist() if isinstance(value, np.ndarray) else value)
 
 
 def _frame(position: ArrayLike, quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> _Array:
@@ -302,8 +305,9 @@ def _rotation(frame: _Array) -> _Keys:
 class Writer:
     """Writes a compiled model as a scene."""
 
-    def __init__(self, model: mujoco.MjModel, description: Description, folder: str | None) -> None:
-        self.model, self.description, self.folder, self.note = model, description, folder, description.note
+    def __init__(self, model: Any, description: Description, folder: str | None) -> None:
+        self.model: Any = model
+        self.description, self.folder, self.note = description, folder, description.note
         self.meshes: dict[str, bytes] = {}
         self.lines: list[str] = []
         self.taken: tuple[set[str], set[str]] = ({"world"}, {"world"})
@@ -313,10 +317,11 @@ class Writer:
         for b in range(model.nbody - 1, 0, -1):
             carried[model.body_parentid[b]] += carried[b]
         # Bodies without joints are parts of those that carry them.
-        self.owner, self.place = [0], [np.eye(4)]
+        self.owner: list[int] = [0]
+        self.place: list[_Array] = [np.eye(4)]
         self.parts: dict[int, list[int]] = {0: [0]}
         for b in range(1, model.nbody):
-            parent, name = model.body_parentid[b], self.raw_bodies[b]
+            parent, name = int(model.body_parentid[b]), self.raw_bodies[b]
             is_own = model.body_jntnum[b] > 0
             self.owner.append(b if is_own else self.owner[parent])
             self.parts.setdefault(self.owner[b], []).append(b)
@@ -391,7 +396,7 @@ class Writer:
         centre = masses @ centres / (masses.sum() or 1.0)
         inertia = np.zeros((3, 3))
         for part, frame in zip(parts, frames, strict=True):
-            arm, moments = frame[:3, 3] - centre, model.body_inertia[part]
+            arm, moments = frame[:3, 3] - centre, np.asarray(model.body_inertia[part], float)
             inertia += frame[:3, :3] * moments @ frame[:3, :3].T + self.mass[part] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
             given, moments = self.description.moments.get(self.raw_bodies[part], moments), np.sort(moments)
             if not np.allclose(moments * np.max(given), np.sort(given) * moments[2], rtol=1e-6, atol=0.0):
@@ -407,7 +412,8 @@ class Writer:
 
     def shapes(self, owner: int) -> list[_Keys]:
         """Shapes of a body and its parts, or of the world: those that MuJoCo's viewer shows at first; of a URDF, its visuals."""
-        model, kinds, found = self.model, mujoco.mjtGeom, []
+        model, kinds = self.model, mujoco.mjtGeom
+        found: list[_Keys] = []
         geoms = ((b, model.body_geomadr[b] + n) for b in self.parts[owner] for n in range(model.body_geomnum[b]))
         for b, g in geoms:
             group, material = model.geom_group[g], model.geom_matid[g]
@@ -422,7 +428,7 @@ class Writer:
                 keys = {"form": "sphere", "centre": _metres(frame[:3, 3]), "radius": _metres(size[0])}
             elif kind in (kinds.mjGEOM_CAPSULE.value, kinds.mjGEOM_CYLINDER.value):
                 ends = {key: _metres(_point(frame, (0.0, 0.0, z))) for key, z in (("from", -size[1]), ("to", size[1]))}
-                keys = {"form": kinds(int(kind)).name[7:].lower()} | ends | {"radius": _metres(size[0])}
+                keys = {"form": kinds(int(kind)).name[7:].lower(), **ends, "radius": _metres(size[0])}
             elif kind == kinds.mjGEOM_BOX.value and not _rotation(frame):
                 keys = {"form": "box", "centre": _metres(frame[:3, 3]), "size": _metres(2.0 * size)}
             elif kind == kinds.mjGEOM_BOX.value:
@@ -461,9 +467,9 @@ class Writer:
         self.meshes.setdefault(f"{name}.stl", bytes(80) + len(faces).to_bytes(4, "little") + rows.tobytes())
         return f"{name}.stl"
 
-    def carry(self, b: int, data: mujoco.MjData) -> Iterator[_Keys]:
+    def carry(self, b: int, data: Any) -> Iterator[_Keys]:
         """Writes the joint that carries a body, or the chain of joints; yields the ball joint that holds it, for later."""
-        model, kinds, child, parent = self.model, mujoco.mjtJoint, self.bodies[b], self.model.body_parentid[b]
+        model, kinds, child, parent = self.model, mujoco.mjtJoint, self.bodies[b], int(self.model.body_parentid[b])
         frame, carrier = self.place[parent] @ _frame(model.body_pos[b], model.body_quat[b]), self.bodies[self.owner[parent]]
         joints = range(model.body_jntadr[b], model.body_jntadr[b] + model.body_jntnum[b])
         for j in joints:
@@ -495,7 +501,8 @@ class Writer:
 
     def spring(self, j: int, name: str, on: _Keys | None = None, base: tuple[str, _Array] = ("", np.eye(4))) -> None:
         """Spring and damper of a joint: of a hinge or slide, else a bushing between a frame and the point `on`."""
-        model, values = self.model, []
+        model = self.model
+        values: list[float] = []
         for what, flag, row in (("stiffness", "SPRING", j), ("damping", "DAMPER", model.jnt_dofadr[j])):
             # Some versions have the higher powers in the same array, some in one of their own.
             words = ("jnt_stiffness", "jnt_stiffnesspoly", "jnt_springyield") if row is j else ("dof_damping", "dof_dampingpoly")
@@ -560,7 +567,7 @@ class Writer:
         if model.nflex:
             raise self.description.refused(f"flex {self.raw('FLEX', 0)}: the bodies of a scene are rigid")
         for j in range(model.njnt):
-            dofs = slice(model.jnt_dofadr[j], model.jnt_dofadr[j] + (6, 3, 1, 1)[model.jnt_type[j]])
+            dofs = slice(model.jnt_dofadr[j], model.jnt_dofadr[j] + (6, 3, 1, 1)[int(model.jnt_type[j])])
             for what, is_there in (
                 ("range", model.jnt_limited[j] and self.is_on("LIMIT")),
                 ("armature", model.dof_armature[dofs].any()),

@@ -108,7 +108,8 @@ class Scene:
     """A machine with its parameters. A scene never changes: `set` returns another one."""
 
     def __init__(self, native: _native.Scene) -> None:
-        self._native = native
+        self.native = native
+        """The compiled scene, for the modules of the package."""
 
     @staticmethod
     def names() -> list[str]:
@@ -162,33 +163,33 @@ class Scene:
     @property
     def notes(self) -> list[str]:
         """Comments at the head of its text: of an imported robot, what the scene does not have."""
-        text = self._native.origin()[0]
+        text = self.native.origin()[0]
         head = takewhile(lambda line: line.startswith("#"), text.splitlines())
         return [line.lstrip("# ") for line in head]
 
     @property
     def name(self) -> str:
         """Short name."""
-        return self._native.name
+        return self.native.name
 
     @property
     def title(self) -> str:
         """One-line title."""
-        return self._native.title
+        return self.native.title
 
     @property
     def description(self) -> str:
         """Description of the machine."""
-        return self._native.description
+        return self.native.description
 
     @property
     def toml(self) -> str:
         """Text of a scene file of this machine: that of its file, with the changes in it."""
-        return self._native.text()
+        return self.native.text()
 
     def to_dict(self) -> dict[str, Any]:
         """The sections and keys of `toml`, from which `Scene.from_dict` makes the same machine."""
-        sections: dict[str, Any] = json.loads(self._native.sections())
+        sections: dict[str, Any] = json.loads(self.native.sections())
         return sections
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -197,7 +198,7 @@ class Scene:
         The scene file replaces an earlier one; of the others, one with a different content is refused.
         """
         out = Path(path)
-        files = {out.parent / name: content for name, content in self._native.files()}
+        files = {out.parent / name: content for name, content in self.native.files()}
         for file, content in files.items():
             if file.exists() and file.read_bytes() != content:
                 raise OptionError(f"{file} exists already, and has not what the scene {self.name} reads from a file of this name")
@@ -207,31 +208,31 @@ class Scene:
     @property
     def changes(self) -> dict[str, str]:
         """Parameters changed by `set`, as text with units."""
-        return dict(self._native.origin()[3])
+        return dict(self.native.origin()[3])
 
     @property
     def bodies(self) -> list[str]:
         """Names of the moving bodies."""
-        return self._native.bodies
+        return self.native.bodies
 
     @property
     def ball_joints(self) -> list[str]:
         """Names of the joints with play: balls, pins and blocks."""
-        return self._native.ball_joints
+        return self.native.ball_joints
 
     @property
     def sites(self) -> dict[str, list[str]]:
         """Places where each joint with play can touch: `{"J": ["J.a", "J.b"]}`; channels such as `J.a.normal` are theirs."""
-        return dict(self._native.sites)
+        return dict(self.native.sites)
 
     @property
     def parameters(self) -> dict[str, Parameter]:
         """All parameters by key: those of the scene, then those of each joint with play."""
-        return {key: self.parameter(key) for key in self._native.keys()}
+        return {key: self.parameter(key) for key in self.native.keys()}
 
     def parameter(self, key: str) -> Parameter:
         """The parameter `key`, which may also be a number of the file such as `body.rod.mass`."""
-        return Parameter(**self._native.parameter(key))
+        return Parameter(**self.native.parameter(key))
 
     def __getitem__(self, key: str) -> float | int | str | None:
         """Value of the parameter `key`, SI."""
@@ -240,7 +241,7 @@ class Scene:
     @property
     def channels(self) -> list[Channel]:
         """Channels that a run can record."""
-        return [Channel(*row) for row in self._native.channels()]
+        return [Channel(*row) for row in self.native.channels()]
 
     def set(self, changes: Mapping[str, Quantity | None] | None = None, /, **by_name: Quantity | None) -> Scene:
         """Another scene with changed parameters.
@@ -249,10 +250,10 @@ class Scene:
         whole keys: `set({"joint.A.clearance": 1e-4})`. Numbers are SI; None returns to the value of the file.
         """
         named = [(self._key_of(name), value) for name, value in by_name.items()]
-        return Scene(self._native.set([*(changes or {}).items(), *named]))
+        return Scene(self.native.set([*(changes or {}).items(), *named]))
 
     def _key_of(self, name: str) -> str:
-        keys = [key for key in self._native.keys() if not key.startswith("joint.")]
+        keys = [key for key in self.native.keys() if not key.startswith("joint.")]
         found = [key for key in keys if key.rsplit(".", 1)[-1] == name]
         if len(found) > 1:
             raise OptionError(f"{name}: several parameters have this name: {', '.join(found)}; give a mapping with the whole key")
@@ -260,11 +261,11 @@ class Scene:
 
     def geometry(self) -> list[Shape]:
         """Drawn shapes of the world, then of each body, in body axes; a body without any has bars to its joints."""
-        return shapes_of(self._native)
+        return shapes_of(self.native)
 
     def check(self) -> Check:
         """Assembles the machine, counts its bodies, degrees of freedom and constraints, and collects warnings."""
-        return Check(**self._native.check())
+        return Check(**self.native.check())
 
     def run(
         self,
@@ -281,7 +282,7 @@ class Scene:
         is called with the fraction done, from 0 to 1. Doubts about the results become warnings unless `warn` is False.
         """
         names = [channels] if isinstance(channels, str) else list(channels)
-        results = _native.run(self._native, duration, every, names, progress)
+        results = _native.run(self.native, duration, every, names, progress)
         run = Run(self, results)
         if warn:
             for doubt in run.doubts:
@@ -291,19 +292,19 @@ class Scene:
         return run
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Scene) and self._native == other._native
+        return isinstance(other, Scene) and self.native == other.native
 
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _unpickle, (self._native.origin(),)
+        return _unpickle, (self.native.origin(),)
 
     def __repr__(self) -> str:
         changed = "".join(f", {key} = {value}" for key, value in self.changes.items())
         return f"<jointplay.Scene {self.name}{changed}>"
 
     def _repr_html_(self) -> str:
-        frame = frame_of(self._native)
+        frame = frame_of(self.native)
         if frame is not None:
             return frame
         rows = "".join(
@@ -380,17 +381,7 @@ class Run(Mapping[str, NDArray[np.float64]]):
         first = components.get("x")
         if first is not None and components == {"x": first, "y": first + 1, "z": first + 2}:
             return slice(first, first + 3)
-        raise ChannelError(self._explain(channel))
-
-    def _explain(self, channel: str) -> str:
-        members = [name for name in self.channels if name.startswith(f"{channel}.")]
-        if members:
-            return f"`{channel}` stands for several channels: {', '.join(members)}"
-        if any(channel in (known.name, known.column) for known in self.scene.channels):
-            return f"`{channel}` was not recorded: pass channels=[{channel!r}, …] to Scene.run"
-        near = get_close_matches(channel, self._indices, n=1)
-        hint = f" (did you mean `{near[0]}`?)" if near else ""
-        return f"`{channel}` is not a channel of this run{hint}"
+        raise ChannelError(explain(self, channel))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.channels)
@@ -401,7 +392,9 @@ class Run(Mapping[str, NDArray[np.float64]]):
 
     # A comparison of arrays has no single answer.
     __eq__ = object.__eq__
-    __hash__ = object.__hash__
+
+    def __hash__(self) -> int:
+        return object.__hash__(self)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         """The rows as a structured array with a field for each channel."""
@@ -422,7 +415,8 @@ class Run(Mapping[str, NDArray[np.float64]]):
 
     def plot(self, *channels: str, axes: Any = None) -> Any:
         """Draws channels over time into Matplotlib's `axes`, by default new ones, which it returns."""
-        places = [place for channel in channels for place in np.atleast_1d(np.arange(len(self))[self._place(channel)])]
+        rows = np.arange(len(self))
+        places = [int(place) for channel in channels for place in rows[self._place(channel)].ravel()]
         curves = [(self._channels[i][0], self._channels[i][2], self._values[i, : self._rows]) for i in places]
         return _show.plot(axes, self.time, curves)
 
@@ -473,7 +467,25 @@ class Run(Mapping[str, NDArray[np.float64]]):
         return f"<jointplay.Run {self.scene.name}: {self._rows} rows, {len(self._channels)} channels, to {self.end:g} s>"
 
     def _repr_html_(self) -> str:
-        return frame_of(self.scene._native, self.end) or html.escape(repr(self))
+        return frame_of(self.scene.native, self.end) or html.escape(repr(self))
+
+
+def recorded(run: Run) -> dict[str, str]:
+    """The channels of a run by name and by column."""
+    names = set(run.channels)
+    return {text: one.name for one in run.scene.channels if one.name in names for text in (one.name, one.column)}
+
+
+def explain(run: Run, channel: str) -> str:
+    """Why a run has no channel of this name."""
+    members = [name for name in run.channels if name.startswith(f"{channel}.")]
+    if members:
+        return f"`{channel}` stands for several channels: {', '.join(members)}"
+    if any(channel in (known.name, known.column) for known in run.scene.channels):
+        return f"`{channel}` was not recorded: pass channels=[{channel!r}, …] to Scene.run"
+    near = get_close_matches(channel, recorded(run), n=1)
+    hint = f" (did you mean `{near[0]}`?)" if near else ""
+    return f"`{channel}` is not a channel of this run{hint}"
 
 
 _POSE = ("x", "y", "z", "alpha", "beta", "gamma")

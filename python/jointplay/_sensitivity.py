@@ -151,7 +151,7 @@ class Sensitivity:
         library("pandas", "pandas")
         import pandas
 
-        rows = []
+        rows: list[dict[str, Any]] = []
         for output, alone in self.alone.items():
             indices = self.indices.get(output)
             for key, (low, at_low, high, at_high) in alone.items():
@@ -201,8 +201,8 @@ def sensitivity(
             limit = read_quantity(study, 0, target)
 
     stages = Stages(study, threads, progress, record)
-    ends = np.array([one.ends for one in study._distributions.values()])
-    plan = study._native.alone(ends.tolist())
+    ends = np.array([one.ends for one in study.distributions.values()])
+    plan = study.native.alone(ends.tolist())
     nominal, *alone = stages.run("alone", [*plan, *ends.T.tolist()])
     sides = np.array(alone[:-2]).reshape(len(keys), 2, len(outputs))
     screening, kept = None, list(range(len(keys)))
@@ -236,7 +236,7 @@ def sensitivity(
 
 def _screen(stages: Stages, trajectories: int, seed: int) -> tuple[dict[str, Effects | None], list[int]]:
     """Elementary effects (Morris 1991, Technometrics 33, 161-174) on the first output, and the parameters that remain."""
-    distributions = stages.study._distributions
+    distributions = stages.study.distributions
     k = len(distributions)
     problem = {"num_vars": k, "names": list(distributions), "bounds": [[0.0, 1.0]] * k}
     plan = library("SALib.sample.morris").sample(problem, trajectories, num_levels=LEVELS, seed=seed)
@@ -350,7 +350,8 @@ def _reach(
         return Target(limit, [changed(rows[i * STEPS + step], outputs[i, step]) for i, step in hits], None)
     total = {key: one.value for key, one in indices.total.items()} if isinstance(indices, Indices) else dict(zip(keys, gain))
     order = sorted((i for i in range(len(keys)) if gain[i] > 0.0), key=lambda i: (-total.get(keys[i], 0.0), -gain[i]))
-    parts, moved = [], nominal
+    parts: list[NDArray[np.float64]] = []
+    moved = nominal
     for i in order:
         parts.append(path(moved, i))
         moved = parts[-1][-1]
@@ -358,5 +359,5 @@ def _reach(
         return Target(limit, [], None)
     rows = np.concatenate(parts)
     results = stages.run("target-together", rows)[:, 0]
-    hit = np.flatnonzero(results <= limit)
-    return Target(limit, [], changed(rows[hit[0]], results[hit[0]]) if len(hit) else None)
+    hit = np.flatnonzero(results <= limit).tolist()
+    return Target(limit, [], changed(rows[hit[0]], results[hit[0]]) if hit else None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -54,9 +55,8 @@ def main(arguments: argparse.Namespace) -> None:
     scene, over = common.load(arguments), common.requests(arguments)
     options = {"screen": arguments.screen, "target": arguments.target, "seed": arguments.seed}
     span = {"duration": arguments.duration, "from_": arguments.from_}
-    found: Sensitivity = common.perform(
-        arguments, lambda **how: sensitivity(scene, over, arguments.output, rows=rows, **options, **span, **how)
-    )
+    compute = partial(sensitivity, scene, over, arguments.output, rows=rows, **options, **span)
+    found = common.perform(arguments, compute)
     results = summary(found)
     common.write(arguments, scene, found, "sensitivity", {"over": arguments.over, "rows": rows}, results, draw(scene, found))
     common.finish(arguments, results, describe(scene, found))
@@ -113,7 +113,7 @@ def describe(scene: Scene, found: Sensitivity) -> str:
     text = common.describe(scene, found)
     if found.screening is not None:
         first = next(iter(found.alone))
-        rows = []
+        rows: list[list[str]] = []
         for key, effects in found.screening.items():
             numbers = effects and [show(n, found.units[first]) for n in (effects.mean_magnitude, effects.mean, effects.deviation)]
             ends = effects and [show(effects.low, found.units[key]), show(effects.high, found.units[key]), effects.ends]

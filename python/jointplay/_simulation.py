@@ -110,7 +110,7 @@ class Simulation(_Guarded):
     _elements_of: dict[type, Any]
 
     def __new__(cls, scene: Scene) -> Self:
-        self = super().__new__(cls, scene._native)
+        self = super().__new__(cls, scene.native)
         self.scene = scene
         self._is_plain = True
         self._elements_of = {}
@@ -175,7 +175,14 @@ class Simulation(_Guarded):
         self._is_plain = False
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _resumed, (self.scene, self.state, self._is_plain)
+        return self._resumed, (self.scene, self.state, self._is_plain)
+
+    @staticmethod
+    def _resumed(scene: Scene, state: _native.State, is_plain: bool) -> Simulation:
+        simulation = Simulation(scene)
+        simulation.restore(state)
+        simulation._is_plain = is_plain
+        return simulation
 
     def frame(self) -> Frame:
         """The machine at this instant."""
@@ -191,15 +198,8 @@ class Simulation(_Guarded):
 
     def _repr_html_(self) -> str:
         # The link does not contain changes during the run.
-        frame = frame_of(self.scene._native, self.time) if self._is_plain else None
+        frame = frame_of(self.scene.native, self.time) if self._is_plain else None
         return frame or html.escape(repr(self))
 
     def __repr__(self) -> str:
         return f"<jointplay.Simulation {self.scene.name} at {self.time:g} s>"
-
-
-def _resumed(scene: Scene, state: _native.State, is_plain: bool) -> Simulation:
-    simulation = Simulation(scene)
-    simulation.restore(state)
-    simulation._is_plain = is_plain
-    return simulation

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from ._distribution import Distribution, Request, resolve
-from ._options import library, workers
+from ._options import is_a, library, workers
 from .errors import DoubtWarning, OptionError
 
 if TYPE_CHECKING:
@@ -75,15 +75,16 @@ class Study:
         """The scene."""
         self._over = requests(over)
         names = output.split(",") if isinstance(output, str) else output
-        if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        if not is_a(names, Sequence) or not all(is_a(name, str) for name in names):
             raise OptionError(f"output = {output!r}: expected text such as \"tip-error\", or a list of texts")
         self._entries = [entry.strip() for entry in names]
         self._span = duration, from_
         # Raises errors here, not at the first use. The ends of all distributions are checked.
-        self._native.alone([one.ends for one in self._distributions.values()])
+        self.native.alone([one.ends for one in self.distributions.values()])
 
     @cached_property
-    def _distributions(self) -> dict[str, Distribution]:
+    def distributions(self) -> dict[str, Distribution]:
+        """Distribution of each parameter."""
         found: dict[str, Distribution] = {}
         for request in self._over:
             found |= resolve(self.scene, request)
@@ -92,36 +93,37 @@ class Study:
         return found
 
     @cached_property
-    def _native(self) -> _native.Study:
-        return _native.Study(self.scene._native, list(self._distributions), self._entries, *self._span)
+    def native(self) -> _native.Study:
+        """The compiled study, for the modules of the package."""
+        return _native.Study(self.scene.native, list(self.distributions), self._entries, *self._span)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_native", "_distributions")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("native", "distributions")}
 
     @property
     def inputs(self) -> dict[str, float]:
         """Value in the scene, SI, of each parameter."""
-        return {key: value for key, (value, _) in zip(self._distributions, self._native.inputs, strict=True)}
+        return {key: value for key, (value, _) in zip(self.distributions, self.native.inputs, strict=True)}
 
     @property
     def units(self) -> dict[str, str]:
         """SI unit of each parameter; empty for one without."""
-        return {key: unit for key, (_, unit) in zip(self._distributions, self._native.inputs, strict=True)}
+        return {key: unit for key, (_, unit) in zip(self.distributions, self.native.inputs, strict=True)}
 
     @property
     def assumed_ranges(self) -> dict[str, tuple[float, float]]:
         """Ends, SI, of each range that was not given: 0.5 to 1.5 times the value, within the allowed range."""
-        return {key: one.ends for key, one in self._distributions.items() if one.is_assumed}
+        return {key: one.ends for key, one in self.distributions.items() if one.is_assumed}
 
     @property
     def outputs(self) -> dict[str, str]:
         """Unit of each output."""
-        return {name: unit for name, unit, _ in self._native.outputs}
+        return {name: unit for name, unit, _ in self.native.outputs}
 
     @property
     def span(self) -> tuple[float, float]:
         """Length of each run and end of its transient, s."""
-        return self._native.span
+        return self.native.span
 
     def run(
         self,
@@ -136,7 +138,7 @@ class Study:
         A flat list is one run, or with one parameter one run per value. A row with a value that is not finite, or whose run fails,
         gives NaN, and a `jp.DoubtWarning` names it. With `record`, finished runs are kept in this file, and an interrupted call resumes when it is repeated. The file stays.
         """
-        runs = self._run(values, threads, progress, None if record is None else Path(record))
+        runs = compute(self, values, threads, progress, None if record is None else Path(record))
         if failed := [f"values[{i}] {self._why(runs, i)}" for i in np.flatnonzero(runs.status).tolist()]:
             more = f" and {len(failed) - 8} more" if len(failed) > 8 else ""
             warnings.warn(f"{self.scene.name}: no result: {', '.join(failed[:8])}{more}", DoubtWarning, stacklevel=2)
@@ -147,38 +149,41 @@ class Study:
             return f"= {runs.values[row].tolist()} is not finite"
         return "diverged" if runs.status[row] == DIVERGED else "did not start"
 
-    def _run(self, values: Any, threads: int | None, progress: Progress | None, record: Path | None) -> Runs:
-        table, count = self._table(values), workers(threads)
-        finite = np.isfinite(table).all(axis=1)
-        given = table[finite]
-        status = np.full(len(table), NOT_STARTED, dtype=np.int64)
-        results = np.full((len(table), len(self.outputs)), np.nan)
-        if len(given) or not len(table):
-            if len(given):
-                # All values are allowed if the extremes are.
-                self._native.alone(list(zip(given.min(0).tolist(), given.max(0).tolist(), strict=True)))
-            finished = self._native.run(given.tolist(), count, progress, record)
-            status[finite] = finished[:, -1]
-            results[finite] = np.where(finished[:, -1:] == 0, finished[:, :-1], np.nan)
-        return Runs(table, results, status)
-
-    def _table(self, values: Any) -> NDArray[np.float64]:
-        """Values with one row per run."""
-        keys = list(self._distributions)
-        expected = f"expected numbers in SI units, one row per run and one column for each of {', '.join(keys)}"
-        try:
-            table = np.asarray(values, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise OptionError(f"values: {expected}: {error}") from None
-        if table.ndim < 2:
-            table = table.reshape(-1, 1) if len(keys) == 1 else table.reshape(1, -1)
-        if table.ndim != 2 or table.shape[1] != len(keys):
-            given = f"{table.shape[1]} numbers are given for {len(keys)} parameters" if table.ndim == 2 else f"shape {table.shape}"
-            raise OptionError(f"values: {given}: {expected}")
-        return table
-
     def __repr__(self) -> str:
-        return f"<jointplay.Study of {self.scene.name}: {', '.join(self.outputs)} over {len(self._distributions)} parameters>"
+        return f"<jointplay.Study of {self.scene.name}: {', '.join(self.outputs)} over {len(self.distributions)} parameters>"
+
+
+def compute(study: Study, values: Any, threads: int | None, progress: Progress | None, record: Path | None) -> Runs:
+    """Runs at `values`, one row per run."""
+    table, count = _table(study, values), workers(threads)
+    finite = np.isfinite(table).all(axis=1)
+    given = table[finite]
+    status = np.full(len(table), NOT_STARTED, dtype=np.int64)
+    results = np.full((len(table), len(study.outputs)), np.nan)
+    if len(given) or not len(table):
+        if len(given):
+            # All values are allowed if the extremes are.
+            study.native.alone(list(zip(given.min(0).tolist(), given.max(0).tolist(), strict=True)))
+        finished = study.native.run(given.tolist(), count, progress, record)
+        status[finite] = finished[:, -1]
+        results[finite] = np.where(finished[:, -1:] == 0, finished[:, :-1], np.nan)
+    return Runs(table, results, status)
+
+
+def _table(study: Study, values: Any) -> NDArray[np.float64]:
+    """Values with one row per run."""
+    keys = list(study.distributions)
+    expected = f"expected numbers in SI units, one row per run and one column for each of {', '.join(keys)}"
+    try:
+        table = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise OptionError(f"values: {expected}: {error}") from None
+    if table.ndim < 2:
+        table = table.reshape(-1, 1) if len(keys) == 1 else table.reshape(1, -1)
+    if table.ndim != 2 or table.shape[1] != len(keys):
+        given = f"{table.shape[1]} numbers are given for {len(keys)} parameters" if table.ndim == 2 else f"shape {table.shape}"
+        raise OptionError(f"values: {given}: {expected}")
+    return table
 
 
 def requests(over: Over) -> list[Request]:
@@ -186,7 +191,7 @@ def requests(over: Over) -> list[Request]:
     if isinstance(over, Mapping):
         return [Request("over", key, text) for key, text in over.items()]
     entries: Sequence[Any] = [over] if isinstance(over, str) else over
-    if not isinstance(entries, Sequence) or not all(isinstance(one, (str, Request)) for one in entries):
+    if not is_a(entries, Sequence) or not all(isinstance(one, (str, Request)) for one in entries):
         raise OptionError(f"over = {over!r}: expected a mapping of keys to distributions, or a list of keys")
     return [one if isinstance(one, Request) else Request("over", one, None) for one in entries]
 
@@ -215,7 +220,7 @@ class Stages:
     def run(self, stage: str, values: Any) -> NDArray[np.float64]:
         """Outputs at `values`, SI."""
         record = None if self.record is None else record_of(self.record, stage)
-        self.runs[stage] = self.study._run(values, self.threads, self.progress, record)
+        self.runs[stage] = compute(self.study, values, self.threads, self.progress, record)
         return self.runs[stage].results
 
     def count(self, status: int) -> int:
@@ -226,7 +231,7 @@ class Stages:
         """Values of all parameters where those that are `kept`, by default all, have the quantiles `u`."""
         study = self.study
         values = np.tile(list(study.inputs.values()), (len(u), 1))
-        distributions = list(study._distributions.values())
+        distributions = list(study.distributions.values())
         for column, i in enumerate(range(len(distributions)) if kept is None else kept):
             values[:, i] = distributions[i].quantile(u[:, column])
         return values
@@ -252,7 +257,7 @@ def sample(sampling: str, dimensions: int, points: int, seed: int) -> NDArray[np
 def read_quantity(study: Study, o: int, value: Quantity) -> float:
     """A value of output `o`: a number in SI units, or text with a unit."""
     if isinstance(value, str):
-        return study._native.read_output(o, value)
+        return study.native.read_output(o, value)
     if isinstance(value, bool) or not np.isfinite(value):
         raise OptionError(f"{value!r}: expected a finite number in SI units, or text with a unit")
     return float(value)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from . import _native
 from ._distribution import Request
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from ._sensitivity import Sensitivity
     from ._tolerance import Tolerance
 
+T = TypeVar("T")
 BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#404040"
 
 
@@ -88,10 +88,10 @@ def read_rows(option: str, path: Path, heads: tuple[str, ...]) -> list[tuple[str
     return [(place, *cells) for place, cells in rows]
 
 
-def perform(arguments: argparse.Namespace, compute: Callable[..., Any]) -> Any:
+def perform(arguments: argparse.Namespace, compute: Callable[..., T]) -> T:
     """The result of `compute`, which takes `threads`, `progress` and `record`. Its records are beside the folder."""
     check_replaceable(arguments.out, arguments.force)
-    out = os.fspath(arguments.out)
+    out = str(arguments.out)
     if not arguments.quiet and any(arguments.out.resolve().parent.glob(f"{arguments.out.name}.*.partial")):
         print(f"resuming from {out}.*.partial", file=sys.stderr)
     shows = not arguments.quiet and sys.stderr.isatty()
@@ -121,7 +121,7 @@ def write(
     """Writes the folder, which appears whole, and removes the records of the runs."""
     out: Path = arguments.out
     duration, start = found.span
-    meta = json.loads(_native.provenance_of(scene._native))
+    meta = json.loads(_native.provenance_of(scene.native))
     meta |= {"duration_s": duration, "from_s": start, "seed": arguments.seed, "assumed_ranges": found.assumed_ranges, **settings}
     with result_folder(out, arguments.force, json.loads(to_json(meta))) as folder:
         write_table(found.to_pandas(), folder / f"{name}.csv")
@@ -161,9 +161,9 @@ def to_json(value: Any) -> str:
         if isinstance(value, Estimate):
             value = value._asdict()
         if isinstance(value, Mapping):
-            return {str(key): plain(one) for key, one in value.items()}
+            return {str(key): plain(one) for key, one in cast(Mapping[object, object], value).items()}
         if isinstance(value, (list, tuple)):
-            return [plain(one) for one in value]
+            return [plain(one) for one in cast(Sequence[object], value)]
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
     return json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n"

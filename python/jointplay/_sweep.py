@@ -90,33 +90,34 @@ class Sweep:
         }
         self._is_checked = False
         # Raises errors here, not at the first use.
-        _ = self._native
+        _ = self.native
 
     @cached_property
-    def _native(self) -> _native.Sweep:
-        return _native.Sweep(self.scene._native, self._vary, self._is_table, self._options, self._is_checked)
+    def native(self) -> _native.Sweep:
+        """The compiled sweep, for the modules of the package."""
+        return _native.Sweep(self.scene.native, self._vary, self._is_table, self._options, self._is_checked)
 
     def __getstate__(self) -> dict[str, Any]:
-        state = {name: value for name, value in self.__dict__.items() if name != "_native"}
+        state = {name: value for name, value in self.__dict__.items() if name != "native"}
         return {**state, "_is_checked": True}
 
     @property
     def blocks(self) -> int:
         """Number of blocks."""
-        return self._native.blocks
+        return self.native.blocks
 
     @property
     def points(self) -> int:
         """Number of points."""
-        return self._native.points
+        return self.native.points
 
     def describe(self, point: int) -> str:
         """Parameters of a point in words."""
-        return self._native.describe(point)
+        return self.native.describe(point)
 
     def compute(self, block: int) -> NDArray[np.float64]:
         """Numbers of the points of one block: shape (points of the block, numbers of a point)."""
-        return self._native.compute(block)
+        return self.native.compute(block)
 
     def assemble(self, blocks: Iterable[NDArray[np.float64]]) -> SweepResult:
         """Combines all blocks, given in order, into the result."""
@@ -124,10 +125,10 @@ class Sweep:
         if len(given) != self.blocks:
             raise OptionError(f"blocks: {len(given)} given, but the sweep has {self.blocks}")
         for block, rows in enumerate(given):
-            first, end = self._native.block(block)
+            first, end = self.native.block(block)
             if len(rows) != end - first:
                 raise OptionError(f"blocks: block {block} has {len(rows)} points, but should have {end - first}")
-        return SweepResult(self, np.concatenate(given))
+        return self._result(np.concatenate(given))
 
     def run(
         self,
@@ -142,7 +143,10 @@ class Sweep:
         interrupted resumes from it, with the same bits.
         """
         path = None if record is None else os.fspath(record)
-        return SweepResult(self, self._native.run(workers(threads), progress, path))
+        return self._result(self.native.run(workers(threads), progress, path))
+
+    def _result(self, records: NDArray[np.float64]) -> SweepResult:
+        return SweepResult(self, records, self._is_table, self._options["start"])
 
     def __repr__(self) -> str:
         return f"<jointplay.Sweep of {self.scene.name}: {self.points} points in {self.blocks} blocks>"
@@ -172,21 +176,22 @@ def unit_of(column: str) -> str:
 class SweepResult(Mapping[str, NDArray[Any]]):
     """Result of a sweep: arrays by name, as in the archive that `jointplay sweep` writes (`docs/sweeps.md`)."""
 
-    def __init__(self, sweep: Sweep, records: NDArray[np.float64]) -> None:
-        self.axes: dict[str, NDArray[Any]] = {key: np.asarray(values) for key, values in sweep._native.axes()}
+    def __init__(self, sweep: Sweep, records: NDArray[np.float64], is_table: bool, starts: list[str]) -> None:
+        self.axes: dict[str, NDArray[Any]] = {key: np.asarray(values) for key, values in sweep.native.axes()}
         """Values of each varied parameter, SI."""
         self._arrays: dict[str, NDArray[Any]] = dict(self.axes)
         self._single: list[str] = []
-        shape, first = tuple(sweep._native.shape), 0
-        for name, is_integer, count in sweep._native.columns():
+        shape, first = tuple(sweep.native.shape), 0
+        for name, is_integer, count in sweep.native.columns():
             values = records[:, first : first + count]
             first += count
-            if sweep._native.is_per_section(name):
+            if sweep.native.is_per_section(name):
                 values = values.reshape(*shape, count)
             else:
                 self._single.append(name)
                 values = values.reshape(shape)
             self._arrays[name] = values.astype(np.int64) if is_integer else values
+        self._is_table, self._starts = is_table, starts
         self.sweep = sweep
         """The sweep."""
 
@@ -207,7 +212,7 @@ class SweepResult(Mapping[str, NDArray[Any]]):
         library("pandas", "pandas")
         import pandas
 
-        settings = pandas.DataFrame([dict(self.sweep._native.settings(point)) for point in range(self.sweep.points)])
+        settings = pandas.DataFrame([dict(self.sweep.native.settings(point)) for point in range(self.sweep.points)])
         return settings.join(pandas.DataFrame({name: self._arrays[name].ravel() for name in self._single}))
 
     def to_xarray(self) -> xarray.Dataset:
@@ -217,15 +222,15 @@ class SweepResult(Mapping[str, NDArray[Any]]):
         import xarray
 
         sweep = self.sweep
-        shape = tuple(sweep._native.shape)
-        keys = ["point"] if sweep._is_table else list(self.axes)
+        shape = tuple(sweep.native.shape)
+        keys = ["point"] if self._is_table else list(self.axes)
         start = ["start"] if len(shape) > len(keys) else []
         dims = start + keys
         coordinates: dict[str, Any] = {
-            key: ("point" if sweep._is_table else key, values, {"units": sweep.scene.parameter(key).unit})
+            key: ("point" if self._is_table else key, values, {"units": sweep.scene.parameter(key).unit})
             for key, values in self.axes.items()
         }
-        coordinates |= {"start": sweep._options["start"]} if start else {}
+        coordinates |= {"start": self._starts} if start else {}
         variables = {
             name: (dims if name in self._single else [*dims, "section"], values, {"units": unit_of(name)})
             for name, values in self._arrays.items()

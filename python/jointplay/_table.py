@@ -27,7 +27,7 @@ def read_cells(file: str, path: Path, heading: str) -> list[tuple[str, list[str]
     lines = [(number, line) for number, line in lines if line and not line.startswith("#")]
     if len(lines) < 2:
         raise OptionError(f"{file}: expected {heading}")
-    rows = []
+    rows: list[tuple[str, list[str]]] = []
     for number, line in lines:
         place = f"{file}, line {number}"
         if line.count('"') % 2:

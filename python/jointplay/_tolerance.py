@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ._distribution import At, Distribution, Request, resolve
 from ._fits import Search
-from ._options import library, whole
+from ._options import is_a, library, whole
 from ._study import DIVERGED, NOT_STARTED, Estimate, Over, Progress, Runs, Stages, Study, read_quantity, sample
 from .errors import OptionError
 
@@ -213,17 +213,17 @@ def tolerance(
     whole("runs", runs, 2, 1_000_000)
     whole("evaluations", evaluations, 1, 10_000)
     whole("seed", seed, 0, 2**63 - 1)
-    if not isinstance(yield_, (int, float)) or not 0.0 < yield_ <= 1.0:
+    if not is_a(yield_, int, float) or not 0.0 < yield_ <= 1.0:
         raise OptionError(f"yield_ = {yield_!r}: allowed above 0 up to 1")
-    if not isinstance(limits, Mapping) or not limits:
+    if not is_a(limits, Mapping) or not limits:
         raise OptionError("limits: give a limit for at least one output")
     study = Study(scene, over, list(limits), duration=duration, from_=from_)
     given = list(limits.items())
-    bounds = {name: _read_limits(study, o, *given[entry]) for o, (name, _, entry) in enumerate(study._native.outputs)}
+    bounds = {name: _read_limits(study, o, *given[entry]) for o, (name, _, entry) in enumerate(study.native.outputs)}
     candidates = None if cost is None else _candidates(study, cost)
 
     stages = Stages(study, threads, progress, record)
-    distributions = list(study._distributions.values())
+    distributions = list(study.distributions.values())
     unit = sample(sampling, len(distributions), runs, seed)
     lower, upper = (np.array([bound[side] for bound in bounds.values()], dtype=float) for side in (0, 1))
 
@@ -237,7 +237,7 @@ def tolerance(
     fits = None
     if candidates is not None:
         independent = sample("random", len(distributions), runs, (seed + 1) % 2**63)
-        keys = list(study._distributions)
+        keys = list(study.distributions)
 
         def yield_of(stage: str, choice: Sequence[int], unit: NDArray[np.float64]) -> Estimate:
             chosen = {key: own[i].distribution for (key, own), i in zip(candidates.items(), choice, strict=True)}
@@ -267,7 +267,7 @@ def _read_limits(study: Study, o: int, name: str, given: Any) -> Limits:
         if isinstance(given, str):
             low, dots, high = given.partition("..")
             given = (low.strip() or None, high.strip() or None) if dots else (None, given)
-        pair = tuple(given) if isinstance(given, (tuple, list)) else (None, given)
+        pair = tuple(given) if is_a(given, tuple, list) else (None, given)
         if len(pair) != 2:
             raise OptionError(f"{given!r}: expected an upper limit, or a lower and an upper one")
         lower, upper = (None if end is None else read_quantity(study, o, end) for end in pair)
@@ -322,7 +322,7 @@ def drive(inputs: Mapping[str, NDArray[np.float64]], accepted: NDArray[np.bool_]
     """How rejected units differ from accepted ones in each input; None if all units or none are accepted."""
     if accepted.all() or not accepted.any():
         return None
-    drivers = {}
+    drivers: dict[str, RejectDriver] = {}
     for key, values in inputs.items():
         good, bad = values[accepted], values[~accepted]
         if np.ptp(values) == 0.0:
@@ -353,7 +353,7 @@ def _candidates(study: Study, cost: Mapping[str, Mapping[str, float]] | Sequence
             raise OptionError(f"{place}: {pattern}: cost {price}: expected a finite number of at least 0")
         for key, distribution in resolve(study.scene, Request(place, pattern, text)).items():
             with At(f"{place}: {key}"):
-                if key not in study._distributions:
+                if key not in study.distributions:
                     raise OptionError("give the parameter a distribution of its own, too")
                 own = found.setdefault(key, [])
                 if own and distribution.high - distribution.low > WIDER * (own[-1].distribution.high - own[-1].distribution.low):

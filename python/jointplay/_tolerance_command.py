@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -70,9 +71,7 @@ def main(arguments: argparse.Namespace) -> None:
     if arguments.cost is not None:
         cost = [Price(*row) for row in common.read_rows("--cost", arguments.cost, ("parameter", "fit", "cost"))]
     options = {name: getattr(arguments, name) for name in ("runs", "sampling", "seed", "evaluations", "duration", "from_")}
-    found: Tolerance = common.perform(
-        arguments, lambda **how: tolerance(scene, over, limits, cost=cost, yield_=required, **options, **how)
-    )
+    found = common.perform(arguments, partial(tolerance, scene, over, limits, cost=cost, yield_=required, **options))
     results = summary(found)
     settings = {name: getattr(arguments, name) for name in ("limit", "over", "sampling")}
     settings |= {name: path and str(path) for name in ("tolerances", "cost") for path in [getattr(arguments, name)]}
@@ -93,7 +92,7 @@ def read_fraction(text: str) -> float:
 
 def summary(found: Tolerance) -> dict[str, Any]:
     """Everything but the runs, SI."""
-    outputs = []
+    outputs: list[dict[str, Any]] = []
     for name, quality in found.qualities.items():
         lower, upper = found.limits[name]
         outputs.append({"name": name, "unit": found.units[name], "lower": lower, "upper": upper, **statistics(quality)})
@@ -155,7 +154,8 @@ def describe(scene: Scene, found: Tolerance, evaluations: int) -> str:
     if lost := found.not_started + found.diverged:
         text += f"Statistics        of the {units - lost} units with a result\n"
     for name, quality in found.qualities.items():
-        unit, rows = found.units[name], []
+        unit = found.units[name]
+        rows: list[list[str]] = []
         text += f"\n{name} {limits_in_words(found.limits[name], unit)}: {percent(quality.yield_)} of the lot\n"
         for statistic, value in list(statistics(quality).items())[1:]:
             own = "" if statistic in ("cp", "cpk") else unit

@@ -81,5 +81,5 @@ def tradeoff(scene: Scene, *, quick: bool = False, progress: Callable[[float], o
     A `quick` measurement uses a coarse grid over a tenth of a second and takes seconds; a full one, the default, takes a minute. Times are
     processor times of the calling thread. `progress` is called with the fraction done, from 0 to 1.
     """
-    rows = json.loads(_native.tradeoff(scene._native, quick, time.thread_time, progress))
+    rows = json.loads(_native.tradeoff(scene.native, quick, time.thread_time, progress))
     return Tradeoff([TradeoffRow(**row) for row in rows])

@@ -109,7 +109,7 @@ def test_data_files_have_the_results(report, found):
 @pytest.fixture
 def shortened(monkeypatch, found):
     """The command with results at hand and without pictures."""
-    monkeypatch.setattr(page, "drawn", lambda findings: iter(()))
+    monkeypatch.setattr(page, "write_figures", lambda folder, findings: None)
     monkeypatch.setattr(results, "compute", lambda extent, threads, progress, out: found)
 
 
@@ -141,10 +141,10 @@ def test_a_report_is_replaced_only_with_force_and_other_files_never(shortened, t
 
 
 def test_an_interrupted_report_leaves_nothing(shortened, tmp_path, monkeypatch):
-    def interrupt(findings):
+    def interrupt(folder, findings):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(page, "drawn", interrupt)
+    monkeypatch.setattr(page, "write_figures", interrupt)
     with pytest.raises(KeyboardInterrupt):
         run_here(tmp_path / "paper")
     assert not list(tmp_path.iterdir())

@@ -241,9 +241,9 @@ def test_a_scene_shows_its_parameters_or_the_page(monkeypatch):
 
 def test_a_link_opens_the_same_scene_in_the_program(falling, summary):
     for scene in [jp.Scene.load("four-bar").set(clearance="0.5 mm"), jp.Scene.from_toml(falling).set(friction=0.3)]:
-        expected = summary("run", "--link", f"?{link_of(scene._native)}", "--duration", "5ms")
+        expected = summary("run", "--link", f"?{link_of(scene.native)}", "--duration", "5ms")
         assert expected["state_hash"] == scene.run("5 ms").hash
-        expected = summary("run", "--link", f"?{link_of(scene._native, 0.005)}")
+        expected = summary("run", "--link", f"?{link_of(scene.native, 0.005)}")
         assert expected["time_s"] >= 0.005
 
 

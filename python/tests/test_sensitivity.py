@@ -133,7 +133,7 @@ class Machine:
 
     def __init__(self, function, laws):
         self.function = function
-        self.study = type("Study", (), {"_distributions": laws, "inputs": dict.fromkeys(laws, 0.0), "outputs": {"y": ""}})()
+        self.study = type("Study", (), {"distributions": laws, "inputs": dict.fromkeys(laws, 0.0), "outputs": {"y": ""}})()
         self.runs = {}
 
     def at(self, u):
