@@ -24,7 +24,7 @@ pub struct ContactStep {
     /// Velocity used by friction at the start, m/s, not yet projected onto the tangent plane.
     pub slip: Vec3,
     /// Deflection of the bristles at the start, m, in the tangent plane.
-    pub deflection: Vec3,
+    pub bent: Vec3,
     /// Approach speed in the damping term so far, m/s.
     pub approach: f64,
     /// Force over elastic force with which the ball rebounds, in place of the law's damping: see [`Coefficients::rebound`].
@@ -128,10 +128,9 @@ impl Coefficients {
         let mut per_force = direction;
         if let Some(bristles) = &self.bristles {
             let sliding = tangent * (slip * 2.0 - step.slip);
-            let [bent, _] = bristles.step(step, &(tangent * slip), &sliding, force);
-            let unlimited = step.deflection + sliding * (step.h + bristles.lag);
+            let unlimited = step.bent + sliding * (step.h + bristles.lag);
             let (length, limit) = (unlimited.norm(), bristles.limit(force, sliding.norm()));
-            let friction = bent * (bristles.stiffness / force);
+            let friction = bristles.step(step, &sliding, force) * (bristles.stiffness / force);
             direction -= friction;
             // As above: the secant unless the direction is known.
             let mut resistance = tangent;
@@ -181,7 +180,7 @@ mod tests {
             start: normal * (3e-4 + depth),
             clearances: [3e-4; 2],
             slip: Vec3::new(0.01, 0.03, 0.0),
-            deflection: Vec3::zeros(),
+            bent: Vec3::zeros(),
             approach: 0.05,
             rebound: None,
         }

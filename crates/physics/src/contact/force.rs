@@ -1,7 +1,7 @@
 //! The force between a ball and its socket wall, and its derivatives with respect to displacement and velocity. Every contact
 //! force and derivative is computed here.
 
-use super::{BristleForce, Coefficients, ContactState, FrictionBranch, FrictionVelocity, Mat3, Vec3};
+use super::{BristleForce, Bristles, Coefficients, ContactState, FrictionBranch, FrictionVelocity, Mat3, Vec3};
 
 /// Position and motion of a ball in its socket.
 #[derive(Clone, Copy, Debug, Default)]
@@ -44,8 +44,6 @@ pub struct Stiffness {
     pub by_rate: Mat3,
     /// Derivative with respect to the velocity [`Coefficients::slip_velocity`], N s/m.
     pub(crate) by_slip: Mat3,
-    /// Derivative with respect to the deflection of the bristles, N/m.
-    pub(crate) by_deflection: Mat3,
     /// dn/de, 1/m.
     pub normal: Mat3,
 }
@@ -56,12 +54,12 @@ impl Stiffness {
         self.by_displacement += self.by_slip * by_normal * self.normal;
     }
 
-    /// Adds the friction of bristles on a contact with this normal; what depends on the turning of the tangent plane is left out.
-    pub(crate) fn add_bristles(&mut self, normal: &Vec3, force: &BristleForce) {
+    /// Adds the friction of bristles on a contact with this normal, at a fixed deflection; what depends on the turning of the tangent
+    /// plane is left out.
+    pub(crate) fn add_bristles(&mut self, normal: &Vec3, law: &Bristles, force: &BristleForce) {
         let tangent = Mat3::identity() - normal * normal.transpose();
-        self.by_slip += force.by_slip * tangent;
-        self.by_deflection += force.by_deflection * tangent;
-        // The normal force enters as the normal's own row of what is there: F = -N n.
+        self.by_slip += (force.by_bending() * (-law.stiffness * law.lag) + force.by_speed) * tangent;
+        // The normal force is -n . F in what is there.
         let by_normal_force = force.by_normal_force * -normal.transpose();
         self.by_displacement += by_normal_force * self.by_displacement;
         self.by_rate += by_normal_force * self.by_rate;
@@ -73,7 +71,6 @@ impl Stiffness {
             by_displacement,
             by_rate,
             by_slip: Mat3::zeros(),
-            by_deflection: Mat3::zeros(),
             normal: Mat3::zeros(),
         }
     }
@@ -212,7 +209,6 @@ impl Coefficients {
             by_displacement,
             by_rate: along * (n * by_rate).transpose(),
             by_slip,
-            by_deflection: Mat3::zeros(),
             normal: normal_by_displacement,
         }
     }

@@ -11,7 +11,7 @@ mod slip;
 mod state;
 
 pub use approach::ApproachBranch;
-pub use bristle::{BristleForce, Bristles, Deflection};
+pub use bristle::{BristleForce, Bristles};
 pub use discrete::{ContactStep, StepForce};
 pub use elastic::ElasticLaw;
 pub use force::{Force, Separation, Stiffness};
@@ -195,8 +195,8 @@ impl Parameters {
         friction: 0.15,
         static_friction_ratio: 1.0,
         stribeck_speed: 1e-3,
-        bristle_stiffness: 1e7,
-        bristle_damping: 1e3,
+        bristle_stiffness: 1e8,
+        bristle_damping: 2e3,
         restitution: 0.9,
         youngs_modulus: 206e9,
         poisson_ratio: 0.3,

@@ -134,13 +134,6 @@ impl Contacts {
         self.contacts[c].bristles.map(|state| state.first..state.first + 3)
     }
 
-    /// Begins a step at `t`, s, with the bristles `bristles`.
-    pub(super) fn begin_bristles(&mut self, t: f64, bristles: &[f64]) {
-        for state in self.contacts.iter_mut().filter_map(|contact| contact.bristles.as_mut()) {
-            state.begin(t, bristles);
-        }
-    }
-
     /// Writes the rates of the bristles at the latest evaluation.
     pub(super) fn bristle_rates(&self, rates: &mut [f64]) {
         for state in self.contacts.iter().filter_map(|contact| contact.bristles.as_ref()) {

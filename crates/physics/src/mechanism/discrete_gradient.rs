@@ -262,7 +262,7 @@ impl DiscreteGradient {
                 start: start.eccentricity,
                 clearances: start.clearances,
                 slip: start.slip,
-                deflection: Vec3::zeros(),
+                bent: Vec3::zeros(),
                 approach: if contact_state.active {
                     contact_state.approach_speed
                 } else {
@@ -325,7 +325,7 @@ impl DiscreteGradient {
             if let Law::Contact(law) = &row.law {
                 let (site, n) = (&model.sites[row.index], row.normal);
                 let motion = equations.motion();
-                row.step.deflection = contacts.contact(row.index).deflection(bristles, &n, motion);
+                row.step.bent = contacts.contact(row.index).bent(bristles, &n, motion);
                 let spins = [site.carried.body, site.carrier.body].map(|body| &motion[body].angular_velocity);
                 // Along a bore or a plane the centres move without a change of e.
                 let relative = |site: &Site| site.opening(motion, &site.arms(motion)).1;
@@ -724,7 +724,7 @@ impl Evaluator<'_> {
             };
             let n = row.law_force.normal;
             let slip = row.free[1] + row.added[1];
-            let bent = law.deflection_after(&row.step, &n, &slip, -row.force.dot(&n));
+            let bent = law.bent_after(&row.step, &n, &slip, -row.force.dot(&n));
             let own = equations.motion()[model.sites[c].carrier.body].rotation.tr_mul(&bent);
             y_end[first + of.start..first + of.end].copy_from_slice(own.as_slice());
         }

@@ -565,47 +565,25 @@ impl Mechanism {
         self.positions() + self.velocities()
     }
 
-    /// Begins a step, or an evaluation outside of one, at (t, y): bristles slide from there.
-    pub(crate) fn begin_bristles(&mut self, t: f64, y: &[f64]) {
-        if self.contacts.bristles() > 0 {
-            let first = self.first_bristle();
-            self.contacts.begin_bristles(t, &y[first..]);
-        }
-    }
-
-    /// How far the bristles of contact `c` lie beyond `branch` in the motion last measured, at (t, y), m; `None` without bristles.
+    /// How far the bristles of contact `c` lie beyond `branch` in the motion last measured, of the state `y`, m; `None` without
+    /// bristles.
     pub(crate) fn bristle_excess(
         &self,
         c: ContactId,
-        (t, y): (f64, &[f64]),
+        y: &[f64],
         contact_state: &ContactState,
         branch: FrictionBranch,
     ) -> Option<f64> {
-        let at = (t, &y[self.first_bristle()..]);
-        self.contacts.contact(c).bristle_excess(at, self.motion(), contact_state, branch)
+        let bristles = &y[self.first_bristle()..];
+        self.contacts.contact(c).bristle_excess(bristles, self.motion(), contact_state, branch)
     }
 
-    /// Applies the limits of the bristles to the state at the end of a step, in the motion last measured or evaluated there; returns
-    /// whether any had been exceeded. `settled`: the method has applied them itself, but to contacts that have ended.
-    pub(crate) fn settle_bristles(&mut self, t: f64, y: &mut [f64], contact_states: &[ContactState], settled: bool) -> bool {
-        if self.contacts.bristles() == 0 {
-            return false;
+    /// Straightens the bristles of contacts that have ended.
+    pub(crate) fn release_bristles(&self, y: &mut [f64], contact_states: &[ContactState]) {
+        if self.contacts.bristles() > 0 {
+            let ended = contact_states.iter().enumerate().filter(|(_, contact_state)| !contact_state.active);
+            ended.filter_map(|(c, _)| self.bristles_of(c)).for_each(|of| y[of].fill(0.0));
         }
-        let first = self.first_bristle();
-        let mut changed = false;
-        for (c, contact_state) in contact_states.iter().enumerate() {
-            let Some(of) = self.bristles_of(c).filter(|_| !settled || !contact_state.active) else {
-                continue;
-            };
-            let contact = self.contacts.contact(c);
-            if let Some(settled) = contact.settled_deflection((t, &y[first..]), self.motion(), contact_state)
-                && y[of.clone()] != *settled.as_slice()
-            {
-                y[of].copy_from_slice(settled.as_slice());
-                changed |= contact_state.active;
-            }
-        }
-        changed
     }
 
     /// Energy stored in the bristles of the state `y`, J.

@@ -6,12 +6,12 @@
 //! b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s, x_q = (b_q + T x_v) / s, where T maps velocities to
 //! position rates.
 //!
-//! Bristles add deflections z with z' = S v and forces F_z z. As any Runge-Kutta method integrates S v as it does v, z moves with the
-//! positions: F_z S is part of K, and x_z = (b_z + S x_v) / s. (S turns with the surfaces, which the iteration corrects.)
+//! Bristles add deflections z with z' = G z + B v and forces F_z z. Where they stick, G = 0 and z moves with the positions: F_z B is part
+//! of K. Where they slide fast, z follows the velocities: -F_z G^-1 B is part of D. With that, x_z = (s I - G)^-1 (b_z + B x_v).
 
 use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
-use super::elements::{ActiveSet, At, Coupling, ForceElement, TorqueDerivatives};
+use super::elements::{ActiveSet, At, Contact, Coupling, ForceElement, TorqueDerivatives};
 use super::equations::Equations;
 use super::flight::ActiveRanges;
 use super::lu::Lu;
@@ -20,6 +20,46 @@ use crate::integrate::{add_scaled, copy, divide};
 use crate::machine::{Mat3, Vec3};
 use nalgebra::Complex;
 use std::ops::Range;
+
+/// Bristles of a contact, linearised: G = -(1 - turning) / lag across `along`, and -1 / lag along it; B = turning times the sliding velocity
+/// across it.
+#[derive(Clone)]
+struct Bristles {
+    /// Its part of [`Stiff::slips`].
+    slips: Range<usize>,
+    /// That of the carrier.
+    rotation: Mat3,
+    along: Vec3,
+    turning: f64,
+    lag: f64,
+}
+
+impl Bristles {
+    /// Of a contact that carries no force.
+    const FREE: Self =
+        Self { slips: 0..0, rotation: Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), along: Vec3::new(0.0, 0.0, 0.0), turning: 1.0, lag: 1.0 };
+
+    /// B x_v plus `own`, b_z: the parts across and along the direction of sliding, world axes.
+    fn right(&self, slips: &[(usize, Vec3)], x_v: &[f64], own: &[f64]) -> [Vec3; 2] {
+        let slip: Vec3 = slips[self.slips.clone()].iter().map(|(coordinate, slip)| slip * x_v[*coordinate]).sum();
+        let b = self.rotation * Vec3::from_column_slice(own);
+        let parts = |x: Vec3| {
+            let along = self.along * self.along.dot(&x);
+            [x - along, along]
+        };
+        let [across, _] = parts(slip);
+        let [b_across, b_along] = parts(b);
+        [b_across + across * self.turning, b_along]
+    }
+
+    /// -G across and along.
+    fn decay(&self) -> [f64; 2] {
+        [(1.0 - self.turning) / self.lag, 1.0 / self.lag]
+    }
+}
+
+/// Share of the limit by which bristles are turned from which they slide fast.
+const FAST: f64 = 0.5;
 
 /// The linearisation and its factors.
 pub struct Stiff {
@@ -60,11 +100,10 @@ pub struct Stiff {
     /// First velocity and first bristle of a state.
     positions: usize,
     first_bristle: usize,
-    /// By three components of the bristles: the columns of their contact, and the rotation into its carrier's axes; the columns of all.
-    bristles: Vec<(Range<usize>, Mat3)>,
+    /// By three components, and the sliding velocity of their contacts per unit rate of each coordinate.
+    bristles: Vec<Bristles>,
     slips: Vec<(usize, Vec3)>,
-    bristle_scratch: Vec<f64>,
-    bristle_scratch_im: Vec<f64>,
+    bristle_scratch: [Vec<f64>; 2],
     /// Whether no contact or element carries a force: J is then zero except for q' = T v.
     empty: bool,
 }
@@ -107,10 +146,9 @@ impl Stiff {
             moved: Vec::with_capacity(n),
             positions,
             first_bristle: positions + velocities,
-            bristles: vec![(0..0, Mat3::zeros()); bristles / 3],
+            bristles: vec![Bristles::FREE; bristles / 3],
             slips: Vec::with_capacity(n * bristles / 3),
-            bristle_scratch: vec![0.0; bristles],
-            bristle_scratch_im: vec![0.0; bristles],
+            bristle_scratch: [vec![0.0; bristles], vec![0.0; bristles]],
             empty: true,
         }
     }
@@ -135,12 +173,10 @@ impl Stiff {
         self.empty = true;
         let at = At { t, motion, active_set, bristles: &y[self.first_bristle..] };
         self.slips.clear();
-        let of_contacts = contacts.iter().map(|contact| (contact.bristles, contact.coupling(&at)));
+        self.bristles.fill(Bristles::FREE);
+        let of_contacts = contacts.iter().map(|contact| (Some(contact), contact.coupling(&at)));
         let of_elements = elements.iter().map(|element| (None, element.coupling(&at)));
-        for (bristles, coupling) in of_contacts.chain(of_elements) {
-            if let Some(state) = bristles {
-                self.bristles[state.first / 3].0 = 0..0;
-            }
+        for (contact, coupling) in of_contacts.chain(of_elements) {
             let Some(coupling) = coupling else {
                 continue;
             };
@@ -154,9 +190,8 @@ impl Stiff {
             }
             self.add(&coupling);
             self.record_coupled_trees();
-            if let Some(state) = bristles {
-                let carrier = coupling.sides[1].0.body;
-                self.add_bristles(state.first / 3, &coupling, &motion[carrier].rotation);
+            if let Some(contact) = contact.filter(|contact| contact.bristles.is_some()) {
+                self.add_bristles(contact, &coupling, &at);
             }
         }
         self.coordinates.clear();
@@ -209,7 +244,7 @@ impl Stiff {
         for l in &self.columns {
             let normal_q = s.normal * l.centre;
             let slip = if coupling.uses_surface_velocity { l.surface } else { l.centre };
-            let force_q = s.by_displacement * l.centre + s.by_deflection * slip;
+            let force_q = s.by_displacement * l.centre;
             let force_v = s.by_rate * l.centre + s.by_slip * slip;
             let lever = normal_q.cross(&coupling.force);
             for k in &self.columns {
@@ -220,25 +255,41 @@ impl Stiff {
         }
     }
 
-    /// Records how the velocities move the bristles of a contact, whose columns are those in `columns`.
-    fn add_bristles(&mut self, index: usize, coupling: &Coupling, rotation: &Mat3) {
-        let first = self.slips.len();
-        let n = &coupling.normal;
+    /// Adds the force of a contact's bristles, and records how the velocities bend them. Its columns are those in `columns`.
+    fn add_bristles(&mut self, contact: &Contact, coupling: &Coupling, at: &At<'_>) {
+        let (Some(state), Some(law), Some(force)) =
+            (contact.bristles, contact.law.bristles, contact.bristle_force(at))
+        else {
+            return;
+        };
+        let (first, n) = (self.slips.len(), &coupling.normal);
         self.slips.extend(self.columns.iter().map(|column| {
             let slip = if coupling.uses_surface_velocity { column.surface } else { column.centre };
             (column.coordinate, slip - n * n.dot(&slip))
         }));
-        self.bristles[index] = (first..self.slips.len(), rotation.transpose());
-    }
-
-    /// Adds S x_v to b_z, for the velocities in the state `x`.
-    fn move_bristles(&self, x: &[f64], b: &mut [f64]) {
-        for (i, (columns, rotation)) in self.bristles.iter().enumerate() {
-            let slips = self.slips[columns.clone()].iter();
-            let slip: Vec3 = slips.map(|(coordinate, slip)| slip * x[self.positions + coordinate]).sum();
-            let moved = rotation * slip;
-            b[3 * i..3 * i + 3].iter_mut().zip(moved.iter()).for_each(|(b, moved)| *b += moved);
+        let bristles = Bristles {
+            slips: first..self.slips.len(),
+            rotation: at.motion[contact.site.carrier.body].rotation,
+            along: force.along,
+            turning: force.turning,
+            lag: law.lag,
+        };
+        let stiffness = force.by_bending() * (-law.stiffness * force.turning);
+        let [decay, _] = bristles.decay();
+        let slides_fast = force.turning < FAST;
+        for l in bristles.slips.clone() {
+            let (coordinate, slip) = self.slips[l];
+            let force = stiffness * slip;
+            for k in &self.columns {
+                let at = coordinate * self.n + k.coordinate;
+                if slides_fast {
+                    self.by_velocity[at] += k.surface.dot(&force) / decay;
+                } else {
+                    self.by_position[at] += k.surface.dot(&force);
+                }
+            }
         }
+        self.bristles[state.first / 3] = bristles;
     }
 
     /// Converts generalised forces to accelerations.
@@ -322,7 +373,7 @@ impl Stiff {
     pub fn solve(&mut self, b: &mut [f64], active_ranges: &ActiveRanges, equations: &dyn Equations, model: &Model) {
         let positions = self.positions;
         let s = self.shift;
-        self.bristle_scratch.copy_from_slice(&b[self.first_bristle..]);
+        self.bristle_scratch[0].copy_from_slice(&b[self.first_bristle..]);
         if self.empty {
             divide(active_ranges.velocities(), b, s);
         } else {
@@ -348,11 +399,13 @@ impl Stiff {
         equations.position_rate(model, &self.y, &mut self.rate);
         add_scaled(active_ranges.positions(), b, 1.0, &self.rate);
         divide(active_ranges.positions(), b, s);
-        if !self.bristles.is_empty() {
-            let mut moved = std::mem::take(&mut self.bristle_scratch);
-            self.move_bristles(b, &mut moved);
-            b[self.first_bristle..].iter_mut().zip(&moved).for_each(|(x, moved)| *x = moved / s);
-            self.bristle_scratch = moved;
+        let (moving, bent) = b.split_at_mut(self.first_bristle);
+        let own = self.bristle_scratch[0].chunks_exact(3);
+        for ((bristles, own), x) in self.bristles.iter().zip(own).zip(bent.chunks_exact_mut(3)) {
+            let [across, along] = bristles.right(&self.slips, &moving[positions..], own);
+            let [slow, fast] = bristles.decay();
+            let solved = across / (s + slow) + along / (s + fast);
+            x.copy_from_slice(bristles.rotation.tr_mul(&solved).as_slice());
         }
     }
 
@@ -367,8 +420,9 @@ impl Stiff {
     ) {
         let positions = self.positions;
         let inverse = self.shift_pair.inv();
-        self.bristle_scratch.copy_from_slice(&re[self.first_bristle..]);
-        self.bristle_scratch_im.copy_from_slice(&im[self.first_bristle..]);
+        for (own, part) in self.bristle_scratch.iter_mut().zip([&*re, &*im]) {
+            own.copy_from_slice(&part[self.first_bristle..]);
+        }
         if !self.empty {
             let (re_q, re_v) = re.split_at(positions);
             let (im_q, im_v) = im.split_at(positions);
@@ -400,15 +454,22 @@ impl Stiff {
             add_scaled(active_ranges.positions(), part, 1.0, rate);
         }
         multiply(active_ranges.positions(), re, im, inverse);
-        if !self.bristles.is_empty() {
-            let mut moved = [&mut self.bristle_scratch, &mut self.bristle_scratch_im].map(std::mem::take);
-            self.move_bristles(re, &mut moved[0]);
-            self.move_bristles(im, &mut moved[1]);
-            for (i, (re_z, im_z)) in moved[0].iter().zip(&moved[1]).enumerate() {
-                let x = inverse * Complex::new(*re_z, *im_z);
-                (re[self.first_bristle + i], im[self.first_bristle + i]) = (x.re, x.im);
+        for (i, bristles) in self.bristles.iter().enumerate() {
+            let part = |x: &[f64], own: &[f64]| bristles.right(&self.slips, &x[positions..], &own[3 * i..3 * i + 3]);
+            let [re_right, im_right] = [part(re, &self.bristle_scratch[0]), part(im, &self.bristle_scratch[1])];
+            let mut solved = [Vec3::zeros(); 2];
+            for (side, decay) in bristles.decay().into_iter().enumerate() {
+                let inverse = (self.shift_pair + decay).inv();
+                for axis in 0..3 {
+                    let x = inverse * Complex::new(re_right[side][axis], im_right[side][axis]);
+                    solved[0][axis] += x.re;
+                    solved[1][axis] += x.im;
+                }
             }
-            [self.bristle_scratch, self.bristle_scratch_im] = moved;
+            let own = self.first_bristle + 3 * i..self.first_bristle + 3 * i + 3;
+            for (part, solved) in [&mut *re, &mut *im].into_iter().zip(solved) {
+                part[own.clone()].copy_from_slice(bristles.rotation.tr_mul(&solved).as_slice());
+            }
         }
     }
 }

@@ -1,8 +1,8 @@
 //! A contact of a joint with play, between a part and a wall, by the laws in `contact`.
 
 use super::{ActiveSet, At, Coupling, ForceElement, Loads};
-use crate::contact::{BristleForce, Coefficients, ContactState, Deflection, Force, FrictionBranch, Separation, Stiffness};
-use crate::machine::{Mat3, Vec3};
+use crate::contact::{BristleForce, Coefficients, ContactState, Force, FrictionBranch, Separation};
+use crate::machine::Vec3;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::loose::{Spot, Wall};
 use crate::mechanism::model::{Anchor, ContactId, Site};
@@ -36,41 +36,13 @@ pub struct Contact {
     pub bristles: Option<BristleState>,
 }
 
-/// The bristles of a contact within a step; in axes fixed to the carrier.
+/// The bristles of a contact, in axes fixed to the carrier.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BristleState {
     /// First of their three components among those of all bristles.
     pub first: usize,
-    /// Time at which the step began, s, and the deflection there, m.
-    began: f64,
-    start: Vec3,
-    /// Sliding velocity at the latest evaluation, m/s; 0 without a force.
+    /// Rate of the deflection at the latest evaluation, m/s; 0 without contact.
     pub rate: Vec3,
-}
-
-impl BristleState {
-    /// Components of the state.
-    fn of(&self, bristles: &[f64]) -> Vec3 {
-        Vec3::from_column_slice(&bristles[self.first..self.first + 3])
-    }
-
-    /// Begins a step at `t` with the bristles `bristles`.
-    pub fn begin(&mut self, t: f64, bristles: &[f64]) {
-        (self.began, self.start) = (t, self.of(bristles));
-    }
-
-    /// In the plane across `normal`, for the carrier's `rotation`.
-    fn deflection(&self, t: f64, bristles: &[f64], normal: &Vec3, rotation: &Mat3) -> Deflection {
-        let in_plane = |own: Vec3| {
-            let turned = rotation * own;
-            turned - normal * normal.dot(&turned)
-        };
-        Deflection {
-            start: in_plane(self.start),
-            displaced: in_plane(self.of(bristles)),
-            elapsed: t - self.began,
-        }
-    }
 }
 
 impl Contact {
@@ -80,85 +52,78 @@ impl Contact {
         Self { id, site, law, gap: Gap::default(), bristles }
     }
 
-    /// Friction of the bristles under the normal force of `gap` at the separation there, on the branch `branch`; with the deflection
-    /// and the sliding velocity of the surfaces. `None` without bristles.
+    /// Deflection of its bristles, m, in world axes and the plane across `normal`; zero without bristles.
+    pub fn bent(&self, bristles: &[f64], normal: &Vec3, motion: &[Kinematics]) -> Vec3 {
+        self.bristles.map_or_else(Vec3::zeros, |BristleState { first, .. }| {
+            let own = Vec3::from_column_slice(&bristles[first..first + 3]);
+            let turned = motion[self.site.carrier.body].rotation * own;
+            turned - normal * normal.dot(&turned)
+        })
+    }
+
+    /// Friction of the bristles under the normal force `normal_force`, N, at the separation of the gap, on the branch `branch`; with
+    /// the deflection, m, and the sliding velocity, m/s. `None` without bristles.
     fn bristle_friction(
         &self,
-        (t, bristles): (f64, &[f64]),
+        bristles: &[f64],
         motion: &[Kinematics],
         branch: FrictionBranch,
         normal_force: f64,
-    ) -> Option<(BristleForce, Deflection, Vec3)> {
-        let (state, law) = (self.bristles.as_ref()?, self.law.bristles.as_ref()?);
+    ) -> Option<(BristleForce, Vec3, Vec3)> {
+        let law = self.law.bristles.as_ref()?;
         let at = &self.gap.separation;
         let slip = at.sliding_velocity(&self.slip_velocity(&at.normal, motion));
-        let rotation = &motion[self.site.carrier.body].rotation;
-        let deflection = state.deflection(t, bristles, &at.normal, rotation);
-        Some((law.force(branch, &deflection, &slip, normal_force), deflection, slip))
-    }
-
-    /// Normal force at the gap last measured in this contact state, N.
-    fn measured_normal_force(&self, contact_state: &ContactState) -> f64 {
-        let at = &self.gap.separation;
-        self.law.normal_force(at.penetration, at.rate, contact_state.approach(&self.law, at.rate))
+        let bent = self.bent(bristles, &at.normal, motion);
+        Some((law.force(branch, &bent, &slip, normal_force), bent, slip))
     }
 
     /// How far the bristles lie beyond `branch` at the gap last measured, m; `None` without bristles.
     pub fn bristle_excess(
         &self,
-        at: (f64, &[f64]),
+        bristles: &[f64],
         motion: &[Kinematics],
         contact_state: &ContactState,
         branch: FrictionBranch,
     ) -> Option<f64> {
-        let normal_force = self.measured_normal_force(contact_state);
-        self.bristle_friction(at, motion, branch, normal_force).map(|(force, ..)| force.excess)
-    }
-
-    /// The deflection within its limit at the gap last measured, carrier's axes, m: that with which the next step starts; `None`
-    /// without bristles.
-    pub fn settled_deflection(
-        &self,
-        at: (f64, &[f64]),
-        motion: &[Kinematics],
-        contact_state: &ContactState,
-    ) -> Option<Vec3> {
-        if !contact_state.active {
-            return self.bristles.map(|_| Vec3::zeros());
-        }
-        let normal_force = self.measured_normal_force(contact_state);
-        let (_, deflection, slip) = self.bristle_friction(at, motion, FrictionBranch::Unfrozen, normal_force)?;
-        let settled = self.law.bristles.as_ref()?.settled(&deflection, &slip, normal_force);
-        Some(motion[self.site.carrier.body].rotation.tr_mul(&settled))
-    }
-
-    /// World axes, m, in the plane across `normal`; zero without bristles.
-    pub fn deflection(&self, bristles: &[f64], normal: &Vec3, motion: &[Kinematics]) -> Vec3 {
-        self.bristles.map_or_else(Vec3::zeros, |state| {
-            state.deflection(0.0, bristles, normal, &motion[self.site.carrier.body].rotation).displaced
-        })
+        let at = &self.gap.separation;
+        let approach = contact_state.approach(&self.law, at.rate);
+        let normal_force = self.law.normal_force(at.penetration, at.rate, approach);
+        self.bristle_friction(bristles, motion, branch, normal_force).map(|(force, ..)| force.excess)
     }
 
     /// Adds bristle friction to the gap just loaded; returns whether it has left its branch.
     #[inline(never)]
     fn load_bristles(&mut self, at: &At<'_>, contact_state: &ContactState) -> bool {
-        let found = self.bristle_friction((at.t, at.bristles), at.motion, contact_state.friction_branch, self.gap.normal_force);
-        let (Some((force, _, slip)), Some(state)) = (found, &mut self.bristles) else {
+        let branch = contact_state.friction_branch;
+        let found = self.bristle_friction(at.bristles, at.motion, branch, self.gap.normal_force);
+        let normal_rate = self.normal_rate(at.motion);
+        let (Some((force, bent, slip)), Some(state)) = (found, &mut self.bristles) else {
             return false;
         };
-        state.rate = at.motion[self.site.carrier.body].rotation.tr_mul(&slip);
+        // The deflection stays in the tangent plane as that turns in the carrier.
+        let turning = self.gap.separation.normal * normal_rate.dot(&bent);
+        state.rate = at.motion[self.site.carrier.body].rotation.tr_mul(&(force.rate - turning));
         self.gap.friction = force.force;
         self.gap.slip_speed = slip.norm();
         force.excess > 0.0
     }
 
-    /// Adds the derivatives of the bristles' friction to those of the normal force.
-    fn add_bristles(&self, at: &At<'_>, contact_state: &ContactState, stiffness: &mut Stiffness) {
-        let branch = contact_state.friction_branch;
-        let found = self.bristle_friction((at.t, at.bristles), at.motion, branch, self.gap.normal_force);
-        if let Some((force, ..)) = found {
-            stiffness.add_bristles(&self.gap.separation.normal, &force);
+    /// The friction of the bristles after an evaluation, with its derivatives; `None` without bristles.
+    pub fn bristle_force(&self, at: &At<'_>) -> Option<BristleForce> {
+        let branch = at.active_set.contact_state(self.id)?.friction_branch;
+        self.bristle_friction(at.bristles, at.motion, branch, self.gap.normal_force).map(|(force, ..)| force)
+    }
+
+    /// Rate of the normal relative to the carrier, 1/s.
+    fn normal_rate(&self, motion: &[Kinematics]) -> Vec3 {
+        let (gap, carrier) = (&self.gap, &motion[self.site.carrier.body]);
+        let Separation { normal, distance, .. } = gap.separation;
+        if matches!(self.site.wall, Wall::Plane(_)) || distance == 0.0 {
+            return Vec3::zeros();
         }
+        let velocity = gap.eccentricity_rate - carrier.angular_velocity.cross(&gap.eccentricity);
+        let across = self.site.wall.confined(&carrier.rotation) * velocity;
+        (across - normal * normal.dot(&across)) / distance
     }
 
     /// Whether it may carry a force.
@@ -269,7 +234,7 @@ impl Contact {
         gap.friction = force.friction;
         gap.slip_speed = force.slip_speed;
         let levers = wall.levers(law, separation.distance);
-        if self.bristles.is_some() && force.normal > 0.0 {
+        if self.bristles.is_some() {
             counts.friction += 1;
             leaves |= self.load_bristles(at, contact_state);
         }
@@ -319,7 +284,11 @@ impl ForceElement for Contact {
             law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force, &confined);
         let distance = gap.separation.distance;
         let levers = site.wall.levers(law, distance);
-        self.add_bristles(at, contact_state, &mut stiffness);
+        if let Some(force) = self.bristle_force(at)
+            && let Some(law) = &law.bristles
+        {
+            stiffness.add_bristles(&n, law, &force);
+        }
         stiffness.add_normal_rotation(&law.slip_velocity_by_normal(self.spins(at.motion), levers));
         Some(Coupling {
             sides: site.sides(law, distance, at.motion),

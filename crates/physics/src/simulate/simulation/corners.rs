@@ -87,7 +87,7 @@ impl Stepping<'_> {
         mechanism.measure(now.t, &now.y);
         for (c, contact_state) in now.contact_states.iter_mut().enumerate() {
             if is_unfrozen(contact_state) {
-                let excess = mechanism.bristle_excess(c, (now.t, &now.y), contact_state, FrictionBranch::Sticking);
+                let excess = mechanism.bristle_excess(c, &now.y, contact_state, FrictionBranch::Sticking);
                 let law = mechanism.contacts.coefficients(c);
                 contact_state.friction_branch = match excess {
                     Some(excess) if excess > 0.0 => FrictionBranch::Sliding,
@@ -262,9 +262,9 @@ impl Stepping<'_> {
         self.measure_at(c, theta, h);
         let speed = self.mechanism.slip_speed(c);
         let contact_state = &self.state.now.contact_states[c];
-        let (slip, at) = (contact_state.friction_branch, (self.state.now.t + theta * h, &self.scratch_y[..]));
+        let slip = contact_state.friction_branch;
         let law = self.mechanism.contacts.coefficients(c);
-        let of_bristles = self.mechanism.bristle_excess(c, at, contact_state, slip);
+        let of_bristles = self.mechanism.bristle_excess(c, self.scratch_y, contact_state, slip);
         (of_bristles.unwrap_or_else(|| law.excess_over_branch(slip, speed)), speed)
     }
 

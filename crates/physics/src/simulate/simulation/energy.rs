@@ -69,7 +69,6 @@ impl Stepping<'_> {
             }
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
-            mechanism.begin_bristles(now.t, &now.y);
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
             if self.state.record.wear.is_some() {
@@ -152,7 +151,6 @@ impl Stepping<'_> {
         let located = self.locates();
         let Self { mechanism, stepper, state, before, scratch_y, scratch_k, .. } = self;
         mechanism.forget_evaluation();
-        mechanism.begin_bristles(before.t, &before.y);
         let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
         let powers = evaluator.powers(before.t + theta * h, scratch_y, scratch_k);
         if let Some(wear) = &mut state.record.wear {

@@ -230,7 +230,6 @@ impl Stepping<'_> {
     fn immediate_derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.with_all_bodies(|run| {
             let active_set = ActiveSet::Immediate(&run.state.now.contact_states);
-            run.mechanism.begin_bristles(t, y);
             run.mechanism.evaluator(active_set).derivative(t, y, dy);
             run.mechanism.forget_evaluation();
         });

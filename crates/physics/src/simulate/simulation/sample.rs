@@ -39,17 +39,14 @@ impl Stepping<'_> {
         if inside {
             mechanism.project(time, scratch_y);
         }
-        let (contacts_before, now) = (&before.contact_states, &state.now.contact_states);
+        let (before, now) = (&before.contact_states, &state.now.contact_states);
         for (j, contact_state) in scratch_contacts.iter_mut().enumerate() {
             // A contact that began within a fixed step has its approach speed from then on.
-            let known = !inside || (!located && !contacts_before[j].active);
-            *contact_state = if known { now[j] } else { contacts_before[j] };
+            let known = !inside || (!located && !before[j].active);
+            *contact_state = if known { now[j] } else { before[j] };
         }
-        let (began, from): (f64, &[f64]) = if inside { (before.t, &before.y) } else { (time, scratch_y) };
-        mechanism.begin_bristles(began, from);
         let mut evaluator = mechanism.evaluator(ActiveSet::by(located, scratch_contacts));
         evaluator.evaluate_fully(time, scratch_y, scratch_k);
-        mechanism.settle_bristles(time, scratch_y, scratch_contacts, false);
         if flies {
             self.exclude_flights();
         }

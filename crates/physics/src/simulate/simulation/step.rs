@@ -115,7 +115,6 @@ impl Stepping<'_> {
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
         let active_set = ActiveSet::by(located, &now.contact_states);
-        mechanism.begin_bristles(now.t, &now.y);
         let mut evaluator = mechanism.evaluator(active_set);
         evaluator.derivative(now.t, &now.y, &mut now.k);
         mechanism.complete_gaps(active_set, &now.y);
@@ -181,7 +180,6 @@ impl Stepping<'_> {
         let Self { mechanism, stepper, state, attempt, .. } = self;
         let State { now, conditions, polynomial, .. } = &mut **state;
         let contact_states = &now.contact_states;
-        mechanism.begin_bristles(now.t, &now.y);
         mechanism.freeze_elements(&attempt.element_sides);
         attempt.has_left_branch.fill(false);
         let mut evaluator =
@@ -305,8 +303,8 @@ impl Stepping<'_> {
         self.find_peak_forces(h);
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
-        let bent = self.settle_bristles(mean_rates);
-        let again = bent || (mean_rates && self.mechanism.has_reactions()) || (!mean_rates && switched.forces);
+        self.mechanism.release_bristles(&mut self.state.now.y, &self.state.now.contact_states);
+        let again = (mean_rates && self.mechanism.has_reactions()) || (!mean_rates && switched.forces);
         if !again && !located {
             self.track_reactions();
         }
@@ -318,7 +316,6 @@ impl Stepping<'_> {
             let Self { mechanism, state, scratch_k, .. } = self;
             let StepEnd { t, y, k, contact_states, .. } = &mut state.now;
             let rate: &mut [f64] = if mean_rates { scratch_k } else { k };
-            mechanism.begin_bristles(*t, y);
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, contact_states));
             evaluator.derivative(*t, y, rate);
             let counts = evaluator.counts;
@@ -331,20 +328,6 @@ impl Stepping<'_> {
         self.search_peaks();
         self.count_turns();
         Ok(())
-    }
-
-    /// Applies the limits of the bristles to the step just accepted, unless the method did (`settled`). Returns whether that changes
-    /// their forces.
-    fn settle_bristles(&mut self, settled: bool) -> bool {
-        let Self { mechanism, state, .. } = self;
-        let now = &mut state.now;
-        if mechanism.contacts.bristles() == 0 {
-            return false;
-        }
-        if !mechanism.is_measured_at(now.t) {
-            mechanism.measure(now.t, &now.y);
-        }
-        mechanism.settle_bristles(now.t, &mut now.y, &now.contact_states, settled)
     }
 
     /// Counts the turns of angles that follow from poses at the current state.
