@@ -1,9 +1,10 @@
 //! Friction that sticks, against closed forms and an independent model.
 
-use crate::common::{Changes, frame_now, parse, run_until};
+use crate::common::{Changes, THREE_VARIANTS, frame_now, live, parse, run_until, simulation};
 use jointplay_physics::contact::{ElasticLaw, Parameters};
 use jointplay_physics::integrate::Method;
-use jointplay_physics::simulate::{ContactMode, Simulation};
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::simulate::{ContactMode, Effect, Frame, Simulation};
 
 const BRISTLES: (&str, &str) = ("contact.friction_law", "bristle");
 
@@ -228,5 +229,116 @@ fn a_block_on_a_belt_sticks_and_slips_as_in_an_independent_model() {
         }
         let ledger = frame_now(&mut simulation).ledger.expect("on");
         assert!(ledger.relative_residual().abs() < 1e-4, "{method}: {:e}", ledger.relative_residual());
+    }
+}
+
+/// Every kind of joint with play, ball, pin, block and planar pin, in every method and formulation.
+#[test]
+fn methods_and_formulations_agree_on_every_kind() {
+    for (name, end) in [("spcmm", 20e-3), ("slider-crank-worn", 8e-3), ("excavator", 60e-3), ("released-slide", 8e-3)] {
+        let runs = THREE_VARIANTS.map(|(method, formulation)| {
+            let changes = [
+                BRISTLES,
+                ("contact.static_friction_ratio", "1.3"),
+                ("solver.method", method),
+                ("formulation", formulation),
+                ("solver.tolerance", "1e-9"),
+            ];
+            let mut run = simulation(name, &changes);
+            let (mut frame, mut losses) = (Frame::default(), vec![0.0]);
+            for n in 1..=200 {
+                let time = end * f64::from(n) / 200.0;
+                run.advance_to(time).unwrap();
+                run.sample(time, &mut frame);
+                losses.push(frame.ledger.expect("on").friction_loss);
+            }
+            let ledger = frame.ledger.expect("on");
+            assert!(losses.windows(2).all(|pair| pair[1] >= pair[0] - 1e-9 * ledger.exchanged), "{name}, {method}");
+            assert!(ledger.residual().abs() < 1e-6 * ledger.exchanged, "{name}, {method}: {:e}", ledger.residual());
+            let friction = frame.joints.iter().map(|joint| joint.friction_force.norm()).fold(0.0, f64::max);
+            (frame.bodies.iter().map(|body| body.position).collect::<Vec<Vec3>>(), losses, friction)
+        });
+        let (first, others) = runs.split_first().expect("three");
+        for (i, other) in others.iter().enumerate() {
+            let off = first.0.iter().zip(&other.0).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            let loss = (first.1[200] / other.1[200] - 1.0).abs();
+            println!("{name} {i}: {off:e} m, loss {loss:e} of {:e}", first.1[200]);
+            assert!(off < 1e-7 && loss < 1e-3, "{name}, {i}: {off:e} m, loss {loss:e}");
+        }
+        assert!(first.1[200] > 0.0, "{name}");
+    }
+}
+
+#[test]
+fn a_state_continues_with_the_same_bits() {
+    for method in Method::ALL {
+        let changes = [BRISTLES, ("solver.method", method.word())];
+        let mut run = simulation("spcmm", &changes);
+        run.advance_to(0.05).unwrap();
+        let state = run.snapshot();
+        run.advance_to(0.08).unwrap();
+        let hash = run.state_hash();
+        let mut other = simulation("spcmm", &changes);
+        other.restore(&state);
+        other.advance_to(0.08).unwrap();
+        assert_eq!(other.state_hash(), hash, "{method}");
+    }
+}
+
+#[test]
+fn the_law_changes_at_a_reset_and_its_numbers_at_once() {
+    let mut run = live("spcmm", &[BRISTLES]);
+    run.advance_to(0.03).unwrap();
+    for (key, value, effect) in [
+        ("contact.static_friction_ratio", "1.5", Effect::Now),
+        ("contact.stribeck_speed", "1 mm/s", Effect::Now),
+        ("contact.bristle_stiffness", "5e7 N/m", Effect::Now),
+        ("contact.bristle_damping", "500 N s/m", Effect::Now),
+        ("joint.S2.friction_law", "none", Effect::AtReset),
+    ] {
+        assert_eq!(run.set(key, value), Ok(effect), "{key}");
+        let next = run.time() + 5e-3;
+        run.advance_to(next).unwrap();
+        let ledger = *run.ledger().expect("on");
+        assert!(ledger.residual().abs() < 1e-5 * ledger.exchanged, "{key}: {:e}", ledger.residual());
+    }
+}
+
+/// A block in a guide 50 mm from the vertical axis of a table that turns at 3 rad/s: its bristles bear 0.45 N and turn with the guide.
+#[test]
+fn what_sticks_turns_with_its_carrier() {
+    let table = "[[body]]\nname = \"table\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+        [[joint]]\nname = \"turn\"\nkind = \"revolute\"\nchild = \"table\"\naxis = [0, 1, 0]\n\
+        drive = { law = \"constant\", velocity = \"3 rad/s\" }";
+    let guide = "parent = \"table\"\nparent_point = \"50 0 0 mm\"";
+    for method in Method::ALL {
+        let mut run = run(&block("-9.81 m/s^2", guide, table), &[("solver.method", method.word())]);
+        run_until(&mut run, 0.5);
+        let before = frame_now(&mut run).joints[0];
+        assert_eq!(before.state, ContactMode::Stick, "{method}");
+        run_until(&mut run, 1.5);
+        let after = frame_now(&mut run).joints[0];
+        let (moved, force) = ((after.axial - before.axial).abs(), after.friction_force.norm());
+        println!("{method}: {moved:e} m, {force} N");
+        assert!(moved < 1e-9, "{method}: {moved:e} m");
+        assert!((force - 0.45).abs() < 1e-3, "{method}: {force} N");
+    }
+}
+
+#[test]
+#[ignore = "full: half a minute"]
+fn full_a_loaded_block_does_not_drift_in_a_thousand_seconds() {
+    let load = "[[load]]\nname = \"push\"\non = { body = \"block\" }\nforce = \"1 0 0 N\"\n\
+        factor = { law = \"table\", interpolation = \"linear\", points = [[\"0 s\", 0], [\"0.5 s\", 1]] }";
+    for method in [Method::Automatic, Method::Radau5, Method::DiscreteGradient] {
+        let mut run = run(&block("-9.81 m/s^2", "", load), &[("solver.method", method.word())]);
+        run_until(&mut run, 1.0);
+        let before = frame_now(&mut run).bodies[0].position;
+        run_until(&mut run, 1000.0);
+        let frame = frame_now(&mut run);
+        let moved = (frame.bodies[0].position - before).norm();
+        println!("{method}: {moved:e} m, {} steps", run.statistics().steps);
+        assert!(moved < 1e-9, "{method}: {moved:e} m");
+        assert_eq!(frame.joints[0].state, ContactMode::Stick, "{method}");
     }
 }
