@@ -40,7 +40,6 @@ fn ball_on_wall(angle: f64, changes: &Changes) -> Simulation {
     Simulation::new(&parse(&text, changes).machine).unwrap()
 }
 
-
 /// A block of 1 kg and 50 mm of length that lies in a guide with play, `planar`, or hangs in it without gravity.
 fn block(gravity: &str, guide: &str, rest: &str) -> String {
     format!(

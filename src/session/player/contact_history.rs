@@ -106,9 +106,7 @@ impl ContactHistory {
         let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
         let first = states.partition_point(|(time, _)| *time < from);
         let pairs = states[first.saturating_sub(1)..].windows(2);
-        let is_touch = |pair: &&[(f64, ContactMode)]| {
-            pair[0].1 == ContactMode::Free && pair[1].1.touches()
-        };
+        let is_touch = |pair: &&[(f64, ContactMode)]| pair[0].1 == ContactMode::Free && pair[1].1.touches();
         pairs
             .filter(is_touch)
             .map(|pair| pair[1].0)

@@ -327,6 +327,28 @@ def level_pin():
     return {"peak": -found.fun}
 
 
+def belt():
+    """m x'' = -k x + mu(v - x') m g while the block slips, x' = v while it sticks, without compliance: the spring breaks it away where
+    it pulls as hard as friction at rest holds. The highest place, and the period."""
+    speed, stiffness, weight, kinetic, ratio, stribeck = 0.05, 200.0, 9.81, 0.15, 1.6, 2e-3
+
+    def rate(_, y):
+        friction = kinetic * weight * (1.0 + (ratio - 1.0) * np.exp(-(((speed - y[1]) / stribeck) ** 2)))
+        return [y[1], friction - stiffness * y[0]]
+
+    def stops(_, y):
+        return y[1]
+
+    def sticks(t, y):
+        return speed - y[1] if t > 1e-3 else 1.0
+
+    sticks.terminal = True
+    breaks = ratio * kinetic * weight / stiffness
+    slip = integrate(rate, [breaks, speed], 1.0, events=[stops, sticks])
+    turns, caught = slip.y_events[0][:, 0], slip.y_events[1][0, 0]
+    return {"period": slip.t_events[1][0] + (breaks - caught) / speed, "highest": turns.max()}
+
+
 JOINTS = Path(__file__).parents[2] / "physics" / "joints"
 
 
@@ -354,6 +376,7 @@ CASES = {
     "bounces": bounces,
     "flores": flores,
     "level_pin": level_pin,
+    "belt": belt,
     **{name: lambda name=name: contacts(name.removeprefix("joint_")) for name in (
         "joint_a", "joint_a_shaft", "joint_b", "joint_h", "joint_c", "joint_c_nofric", "joint_d1", "joint_d2"
     )},

@@ -67,12 +67,7 @@ impl Stiffness {
 
     /// Derivatives of a force between two points.
     pub(crate) fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
-        Self {
-            by_displacement,
-            by_rate,
-            by_slip: Mat3::zeros(),
-            normal: Mat3::zeros(),
-        }
+        Self { by_displacement, by_rate, by_slip: Mat3::zeros(), normal: Mat3::zeros() }
     }
 }
 

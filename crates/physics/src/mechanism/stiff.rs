@@ -36,8 +36,13 @@ struct Bristles {
 
 impl Bristles {
     /// Of a contact that carries no force.
-    const FREE: Self =
-        Self { slips: 0..0, rotation: Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), along: Vec3::new(0.0, 0.0, 0.0), turning: 1.0, lag: 1.0 };
+    const FREE: Self = Self {
+        slips: 0..0,
+        rotation: Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        along: Vec3::new(0.0, 0.0, 0.0),
+        turning: 1.0,
+        lag: 1.0,
+    };
 
     /// B x_v plus `own`, b_z: the parts across and along the direction of sliding, world axes.
     fn right(&self, slips: &[(usize, Vec3)], x_v: &[f64], own: &[f64]) -> [Vec3; 2] {
@@ -257,8 +262,7 @@ impl Stiff {
 
     /// Adds the force of a contact's bristles, and records how the velocities bend them. Its columns are those in `columns`.
     fn add_bristles(&mut self, contact: &Contact, coupling: &Coupling, at: &At<'_>) {
-        let (Some(state), Some(law), Some(force)) =
-            (contact.bristles, contact.law.bristles, contact.bristle_force(at))
+        let (Some(state), Some(law), Some(force)) = (contact.bristles, contact.law.bristles, contact.bristle_force(at))
         else {
             return;
         };
