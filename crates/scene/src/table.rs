@@ -92,7 +92,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 25] = [
+static TABLE: [Parameter; 26] = [
     contact_number!(
         clearance,
         "Clearance",
@@ -203,6 +203,14 @@ static TABLE: [Parameter; 25] = [
         "Friction force as a function of normal force and sliding velocity. modified-coulomb rises linearly between \
          the two slip speeds; none leaves friction out.",
         "Sheng & Chen (2024), eqs. 20, 21",
+    ),
+    contact_number!(
+        wear_coefficient,
+        "Wear coefficient",
+        logarithmic(D::Wear, 0.0, 1e-6, "m^2/N", (1e-18, 1e-8)),
+        "Volume that a contact removes per normal force and sliding distance; the play grows by that volume over the \
+         area of its surfaces, evenly. With 0 nothing wears. 1 mm^3/(N m) is 1e-9 m^2/N.",
+        "Archard (1953); Flores (2009)",
     ),
     gravity(
         "gravity.x",
