@@ -77,4 +77,5 @@ mod tyres;
 mod validation;
 mod walls;
 mod wear;
+mod worn;
 mod written;

@@ -45,7 +45,9 @@ impl LooseKind {
                 "a planar pin has a length only with play.length and elastic = \"line\" or stiffness_at",
             ),
             Self::Slide(Slide { .. }) => ("play.half_z", "a planar block has no height"),
-            Self::Ball | Self::Pin(_) => ("play.face_radius", "its collars have no play.face_radius above the radius of the pin"),
+            Self::Ball | Self::Pin(_) => {
+                ("play.face_radius", "its collars have no play.face_radius above the radius of the pin")
+            }
         }
     }
 }

@@ -41,7 +41,8 @@ pub(super) fn record_rates(wearing: &mut [Growth], instant: usize, mechanism: &M
 pub(super) fn integrate_rates(wearing: &mut [Growth], h: f64, weights: &[f64]) {
     for Growth { nodes, depth, rate } in wearing {
         *rate = nodes[weights.len() - 1];
-        *depth = [0, 1].map(|play| h * weights.iter().zip(&*nodes).map(|(weight, node)| weight * node[play]).sum::<f64>());
+        *depth =
+            [0, 1].map(|play| h * weights.iter().zip(&*nodes).map(|(weight, node)| weight * node[play]).sum::<f64>());
     }
 }
 
