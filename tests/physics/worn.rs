@@ -336,3 +336,14 @@ fn joints_without_a_wearing_surface_are_refused() {
     let mm = parse(&replaced(PIN, "1e-8 m^2/N", "10 mm^3/(N m)"), &[]);
     assert_eq!(mm.machine.loose_joints[0].contact.wear_coefficient, 1e-8);
 }
+
+#[test]
+fn a_play_worn_wide_is_doubted() {
+    let doubts = |wear: &str| {
+        let run = run_by("dopri5", PIN, &[("contact.wear_coefficient", wear)], 0.2);
+        run.doubts().iter().map(ToString::to_string).collect::<String>()
+    };
+    assert!(!doubts("1e-8 m^2/N").contains("worn"));
+    let deep = doubts("1e-6 m^2/N");
+    assert!(deep.contains("J: its play has worn") && deep.contains("a tenth of 10 mm"), "{deep}");
+}
