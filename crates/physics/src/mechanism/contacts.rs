@@ -266,9 +266,9 @@ impl Contacts {
         self.wears
     }
 
-    /// By how much the clearance of joint `j` has worn wider at `t`, within the latest step or at its end, m.
-    pub(crate) fn worn(&self, j: usize, t: f64) -> f64 {
-        self.joints[j].wearing.at(0, t).0
+    /// By how much play `play` of joint `j` has worn wider at `t`, within the latest step or at its end, m.
+    pub(crate) fn worn(&self, j: usize, play: usize, t: f64) -> f64 {
+        self.joints[j].wearing.at(play, t).0
     }
 
     /// Continues the wear of joint `j` with `worn` from `t` on, the end of a step; within the step the clearance stays as it was.

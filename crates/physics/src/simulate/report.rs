@@ -78,7 +78,7 @@ fn joint_report(
         axial,
         tilt,
         clearance: contacts.joint_clearance(j),
-        worn: contacts.worn(j, time),
+        worn: [0, 1].map(|play| contacts.worn(j, play, time)),
         second_clearance: contacts.play(j, 1),
         ..JointReport::default()
     };
