@@ -22,6 +22,7 @@ from ._study import Estimate, Runs, Study
 from ._sweep import Sweep, SweepResult, sweep
 from ._tolerance import FitChoice, Fits, Quality, RejectDriver, Tolerance, tolerance
 from ._tradeoff import Tradeoff, TradeoffRow, tradeoff
+from ._wear import Wear, wear
 from .errors import (
     ChannelError,
     DoubtWarning,
@@ -83,6 +84,7 @@ __all__ = [
     "Tolerance",
     "Tradeoff",
     "TradeoffRow",
+    "Wear",
     "__version__",
     "compare",
     "fit",
@@ -91,4 +93,5 @@ __all__ = [
     "sweep",
     "tolerance",
     "tradeoff",
+    "wear",
 ]

@@ -52,7 +52,8 @@ pub fn ledger<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Option<
     Ok(Some(all))
 }
 
-/// Counters so far, and for each joint with play its largest normal force, N, when it occurred, s, and the number of contacts begun.
+/// Counters so far, and for each joint with play its largest normal force, N, when it occurred, s, the number of contacts
+/// begun, and how far each of its plays has worn wider, m, by which volume, m^3.
 pub fn statistics<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
     let statistics = simulation.statistics();
     let all = PyDict::new(py);
@@ -66,6 +67,8 @@ pub fn statistics<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Bou
         own.set_item("peak_normal", force)?;
         own.set_item("peak_time", time)?;
         own.set_item("impacts", statistics.joints[j].impacts)?;
+        own.set_item("worn", simulation.state().worn(j))?;
+        own.set_item("worn_volume", simulation.state().worn_volumes(simulation.machine(), j))?;
         joints.set_item(&joint.name, own)?;
     }
     all.set_item("joints", joints)?;

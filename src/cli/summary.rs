@@ -81,6 +81,15 @@ pub fn json(
         summary.extend(own);
     }
     peaks::describe(simulation, &mut summary);
+    let worn: Map<String, Json> = worn_joints(simulation)
+        .map(|(joint, worn)| {
+            let [depths, volumes] = [0, 1].map(|i| worn.iter().map(|play| play[i]).collect::<Vec<_>>());
+            (joint.to_owned(), json!({"depth_m": depths, "volume_m3": volumes}))
+        })
+        .collect();
+    if !worn.is_empty() {
+        summary.insert("worn".into(), Json::Object(worn));
+    }
     if let Some(ledger) = simulation.ledger() {
         let terms = ledger.terms().map(|(name, value)| (name.to_owned(), json!(value)));
         summary.insert("energy_J".into(), Json::Object(terms.into_iter().collect()));
@@ -90,6 +99,18 @@ pub fn json(
         summary.insert("restitution".into(), by_joint(&entry));
     }
     summary
+}
+
+/// Joints that wear, and what has worn off in each of their plays so far: depth, m, and volume, m^3.
+fn worn_joints(simulation: &LiveScene) -> impl Iterator<Item = (&str, Vec<[f64; 2]>)> {
+    let (state, joints) = (simulation.state(), &simulation.pending().machine.loose_joints);
+    joints.iter().enumerate().filter_map(move |(j, joint)| {
+        let contact = &state.conditions().joints[j];
+        let (worn, volumes) = (state.worn(j), state.worn_volumes(simulation.machine(), j));
+        let plays = (0..2).filter(|&play| contact.clearances()[play] > 0.0).map(|play| [worn[play], volumes[play]]);
+        let wears = contact.wear_coefficient > 0.0 || worn != [0.0; 2];
+        Some((&*joint.name, plays.collect::<Vec<_>>())).filter(|(_, plays)| wears && !plays.is_empty())
+    })
 }
 
 /// The summary as text; `impacts` if all of them were collected.
@@ -144,6 +165,12 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
             };
             line("  restitution", description);
         }
+    }
+    for (joint, worn) in worn_joints(simulation) {
+        let plays = worn.iter().map(|&[depth, volume]| {
+            format!("{} um, {} mm^3", significant(1e6 * depth, 6), significant(1e9 * volume, 6))
+        });
+        line("  worn", format!("{joint}: {}", plays.collect::<Vec<_>>().join("; ")));
     }
     for part in parts(simulation) {
         line(&part.label, part.description());

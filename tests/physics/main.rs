@@ -78,4 +78,5 @@ mod tyres;
 mod validation;
 mod walls;
 mod wear;
+mod worn;
 mod written;

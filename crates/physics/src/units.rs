@@ -46,6 +46,8 @@ pub enum Dimension {
     TurningStiffness,
     /// N m s/rad
     TurningDamping,
+    /// Worn volume by force and distance; m^2/N
+    Wear,
 }
 
 /// Why a text is not a quantity of the required dimension.
@@ -88,7 +90,7 @@ use Scale::{Decimal, Ratio};
 type Unit = (&'static str, Scale);
 
 /// Every dimension with its name and its units; the first unit is the SI one.
-const UNITS: [(Dimension, &str, &[Unit]); 19] = [
+const UNITS: [(Dimension, &str, &[Unit]); 20] = [
     (
         Dimension::Length,
         "length",
@@ -175,6 +177,11 @@ const UNITS: [(Dimension, &str, &[Unit]); 19] = [
             ("kN m s/rad", Decimal(3)),
             ("N m s/deg", Ratio(180.0, PI)),
         ],
+    ),
+    (
+        Dimension::Wear,
+        "wear coefficient",
+        &[("m^2/N", Decimal(0)), ("mm^2/N", Decimal(-6)), ("mm^3/(N m)", Decimal(-9)), ("1/Pa", Decimal(0))],
     ),
     (Dimension::None, "pure number", &[]),
 ];
@@ -272,6 +279,7 @@ pub fn powers(dimension: Dimension) -> [i8; 4] {
         Dimension::Damping => [1, 0, -1, 0],
         Dimension::TurningStiffness => [1, 2, -2, -1],
         Dimension::TurningDamping => [1, 2, -1, -1],
+        Dimension::Wear => [-1, 1, 2, 0],
     }
 }
 

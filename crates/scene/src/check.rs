@@ -98,7 +98,7 @@ impl Scene {
         keys
     }
 
-    fn conflict_text(&self, conflict: &ContactConflict, key: &str) -> String {
+    pub(super) fn conflict_text(&self, conflict: &ContactConflict, key: &str) -> String {
         match conflict.joint.map(|index| &self.machine.loose_joints[index].name) {
             Some(name) if !key.starts_with("joint.") => {
                 format!("{} (in joint {name})", conflict.fault)

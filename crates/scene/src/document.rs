@@ -674,6 +674,7 @@ fn enters_squared(dimension: Dimension) -> bool {
             | Dimension::Damping
             | Dimension::TurningStiffness
             | Dimension::TurningDamping
+            | Dimension::Wear
     )
 }
 

@@ -31,7 +31,8 @@ embedded! {
     /// Names of the benchmarks, machines with known answers (`docs/validation.md`): known by name alone.
     BENCHMARKS in "benchmarks":
         "simple-pendulum", "n-four-bar", "squeezer", "bricard", "governor", "flores", "flip", "cardan", "backlash", "ball",
-        "scott-russell", "trammel", "level-pin", "thrown-pin", "free-housing", "crank-pin", "driven-slide", "released-slide", "belt";
+        "scott-russell", "trammel", "level-pin", "thrown-pin", "free-housing", "crank-pin", "driven-slide", "released-slide", "belt",
+        "worn-pin";
 }
 
 /// The scene opened if none is named.

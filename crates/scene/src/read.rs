@@ -153,7 +153,10 @@ impl Scene {
         scene.machine.check_contacts().map_err(|conflict| {
             let message = conflict.fault.to_string();
             let keys = scene.keys_of(&conflict);
-            let place = || keys.iter().find_map(|key| places.get(key)).map(|node| node.error(&message));
+            let place = || {
+                let at = |key: &String| Some(places.get(key)?.error(&scene.conflict_text(&conflict, key)));
+                keys.iter().find_map(at)
+            };
             // A default that does not fit the dimensions of a joint is not in the text; the joint is.
             let unplaced = || match conflict.joint.map(|index| &scene.machine.loose_joints[index].name) {
                 Some(name) => scene.start_error(&format!("joint.{name}"), &[], message.clone()),

@@ -92,7 +92,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 29] = [
+static TABLE: [Parameter; 30] = [
     contact_number!(
         clearance,
         "Clearance",
@@ -232,10 +232,18 @@ static TABLE: [Parameter; 29] = [
     contact_number!(
         bristle_damping,
         "Bristle damping",
-        logarithmic(D::Damping, 0.0, 1e9, "N s/m", (1.0, 1e5)),
+        logarithmic(D::Damping, 1e-3, 1e9, "N s/m", (1.0, 1e5)),
         "Damping of a sticking contact of the friction law bristle, so that what sticks stops ringing. It acts below \
          the limit of friction only.",
         "Gonthier et al. (2004)",
+    ),
+    contact_number!(
+        wear_coefficient,
+        "Wear coefficient",
+        logarithmic(D::Wear, 0.0, 1e-6, "m^2/N", (1e-18, 1e-8)),
+        "Volume that a contact removes per normal force and sliding distance; the play grows by that volume over the \
+         area of its surfaces, evenly. With 0 nothing wears. 1 mm^3/(N m) is 1e-9 m^2/N.",
+        "Archard (1953); Flores (2009)",
     ),
     gravity(
         "gravity.x",

@@ -159,6 +159,8 @@ pub struct Parameters {
     pub normal_law: NormalLaw,
     /// Friction law.
     pub friction_law: FrictionLaw,
+    /// Worn volume by normal force and sliding distance, m^2/N (Archard); 0: nothing wears.
+    pub wear_coefficient: f64,
 }
 
 impl Parameters {
@@ -209,6 +211,7 @@ impl Parameters {
         approach_speed: ApproachSpeed::Start,
         normal_law: NormalLaw::LankaraniNikravesh,
         friction_law: FrictionLaw::ModifiedCoulomb,
+        wear_coefficient: 0.0,
     };
 }
 

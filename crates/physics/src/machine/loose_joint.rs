@@ -218,6 +218,17 @@ pub enum LooseFault {
         /// N.
         most: f64,
     },
+    /// A wear coefficient that is none.
+    #[error("{0:e} m^2/N is no wear coefficient; allowed 0 m^2/N and above")]
+    WearCoefficient(f64),
+    /// Wear of a joint whose surface is not known.
+    #[error("no area to spread the wear over: {why}; allowed without it 0 m^2/N")]
+    NoWearingArea {
+        /// The key that tells it.
+        key: &'static str,
+        /// What is missing.
+        why: &'static str,
+    },
     /// A start that only ball joints have.
     #[error("settled places balls in their sockets; with other joints with play, allowed as-given, ideal, equilibrium")]
     Settled,
@@ -242,6 +253,8 @@ impl LooseFault {
             Self::Settled => ["start", "start"],
             Self::LineContact => ["play.elastic", "play.stiffness_at"],
             Self::Stiffness(_) => ["play.stiffness", "play.stiffness"],
+            Self::WearCoefficient(_) => ["wear_coefficient", "wear_coefficient"],
+            Self::NoWearingArea { key, .. } => ["wear_coefficient", key],
             Self::StiffnessAt { .. } => ["play.stiffness_at", "play.radial"],
         }
     }
@@ -258,6 +271,7 @@ impl LooseJoint {
             if play <= most { Ok(()) } else { Err(LooseFault::Play { key, play, part, most }) }
         };
         self.check_elasticity()?;
+        self.check_wear()?;
         match self.kind {
             LooseKind::Ball if second > 0.0 => return Err(LooseFault::SecondPlay { key: "play" }),
             LooseKind::Ball => return Ok(()),

@@ -18,6 +18,7 @@ mod outline;
 mod roles;
 mod settings;
 mod solid;
+mod wearing;
 
 pub use applied::{AppliedForces, ControlFault, ElementNumber, LiveElements};
 pub use body::*;

@@ -1,4 +1,4 @@
-//! Contacts of the loose joints of a scene: forces, clearance ramps and gaps. Allocates nothing. The force of a single contact is
+//! Contacts of the loose joints of a scene: forces, moving clearances and gaps. Allocates nothing. The force of a single contact is
 //! in `elements/contact.rs`.
 
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use super::elements::{ActiveSet, At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
 use super::model::{ContactId, Model, Site};
 use crate::contact::{Coefficients, Parameters};
-use crate::machine::{Machine, Vec3, root};
+use crate::machine::{LooseKind, Machine, Vec3, root};
 use std::ops::Range;
 
 /// A clearance that ramps to a new value.
@@ -62,13 +62,43 @@ impl Ramp {
     }
 }
 
+/// Worn depth of a play: during a step it grows at the rate found at its start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Worn {
+    /// At the start of the step, m.
+    pub depth: f64,
+    /// m/s.
+    pub rate: f64,
+}
+
+/// Worn depths of a joint's plays over the latest step and the next.
+#[derive(Clone, Copy, Default)]
+struct Wearing {
+    /// Start of the latest step and its end, from which the next begins, s.
+    starts: [f64; 2],
+    /// In each of the two, of each play.
+    worn: [[Worn; 2]; 2],
+}
+
+impl Wearing {
+    /// Worn depth of a play and its rate at `t`.
+    fn at(&self, play: usize, t: f64) -> (f64, f64) {
+        let step = usize::from(t >= self.starts[1]);
+        let Worn { depth, rate } = self.worn[step][play];
+        (depth + rate * (t - self.starts[step]), rate)
+    }
+}
+
 /// The contacts of a scene's loose joints.
 pub struct Contacts {
     contacts: Vec<Contact>,
     joints: Vec<JointContacts>,
     /// Components of the bristles of all contacts.
     bristles: usize,
-    has_ramps: bool,
+    /// Some clearance moves, or has worn.
+    moves: bool,
+    /// Some joint has a wear coefficient.
+    wears: bool,
     /// Contacts of the same group act on one another.
     groups: Vec<usize>,
     /// Evaluations skip contacts that do not touch, because some of their bodies are suspended.
@@ -77,18 +107,31 @@ pub struct Contacts {
 
 /// A loose joint's play, and its contacts.
 struct JointContacts {
+    kind: LooseKind,
     parameters: Parameters,
-    /// Of each play.
+    /// Each play without its wear, m, and its ramp, if it has one.
+    plays: [f64; 2],
     ramps: [Option<Ramp>; 2],
+    wearing: Wearing,
     contacts: Range<ContactId>,
+}
+
+impl JointContacts {
+    /// Whether a play changes by more than a change of parameters.
+    fn moves(&self) -> bool {
+        self.ramps != [None; 2] || self.wearing.worn != [[Worn::default(); 2]; 2]
+    }
 }
 
 impl Contacts {
     /// Contacts of `machine`.
     pub fn new(machine: &Machine, model: &Model) -> Self {
         let joints = machine.loose_joints.iter().zip(&model.joints).map(|(joint, compiled)| JointContacts {
+            kind: joint.kind,
             parameters: joint.contact,
+            plays: joint.contact.clearances(),
             ramps: [None; 2],
+            wearing: Wearing::default(),
             contacts: compiled.contacts.clone(),
         });
         let mut bristles = 0;
@@ -104,7 +147,8 @@ impl Contacts {
             bristles,
             joints: joints.collect(),
             groups: groups(machine, model),
-            has_ramps: false,
+            moves: false,
+            wears: machine.loose_joints.iter().any(|joint| joint.contact.wear_coefficient > 0.0),
             skips_inactive: false,
         }
     }
@@ -153,6 +197,11 @@ impl Contacts {
     /// Loose joint to which contact `c` belongs.
     pub fn joint_of(&self, c: ContactId) -> usize {
         self.contacts[c].site.joint
+    }
+
+    /// Play to which contact `c` belongs.
+    pub(crate) fn play_of(&self, c: ContactId) -> usize {
+        self.contacts[c].site.play
     }
 
     /// Place of contact `c` among the sites of its joint.
@@ -226,37 +275,70 @@ impl Contacts {
         self.of_play(j, play).next().map_or(0.0, |c| self.clearance(c))
     }
 
-    /// Starts, ends or restores the ramps of the plays of joint `j`.
-    pub(crate) fn set_ramps(&mut self, j: usize, ramps: [Option<Ramp>; 2]) {
-        self.joints[j].ramps = ramps;
-        self.has_ramps = self.joints.iter().any(|joint| joint.ramps != [None; 2]);
-    }
-
-    /// Sets parameters of joint `j`; `plays`, m, are its current plays.
-    pub(crate) fn set_parameters(&mut self, j: usize, parameters: &Parameters, plays: [f64; 2]) {
+    /// Sets the parameters of joint `j`, its plays without wear, m, and their ramps, and the worn depths from the time `t` on.
+    pub(crate) fn set_joint(
+        &mut self,
+        j: usize,
+        parameters: &Parameters,
+        (plays, ramps): ([f64; 2], [Option<Ramp>; 2]),
+        (t, worn): (f64, [Worn; 2]),
+    ) {
         let joint = &mut self.joints[j];
-        joint.parameters = *parameters;
+        (joint.parameters, joint.plays, joint.ramps) = (*parameters, plays, ramps);
+        joint.wearing = Wearing { starts: [t; 2], worn: [worn; 2] };
         for contact in &mut self.contacts[joint.contacts.clone()] {
-            contact.law = contact.site.stiffness.coefficients(parameters, plays[contact.site.play]);
+            let play = contact.site.play;
+            contact.law = contact.site.stiffness.coefficients(parameters, plays[play] + worn[play].depth);
         }
+        self.moves = self.joints.iter().any(JointContacts::moves);
+        self.wears = self.joints.iter().any(|joint| joint.parameters.wear_coefficient > 0.0);
     }
 
-    /// Updates ramped clearances to `t`.
+    /// Whether some joint wears.
+    pub(crate) fn wears(&self) -> bool {
+        self.wears
+    }
+
+    /// By how much play `play` of joint `j` has worn wider at `t`, within the latest step or at its end, m.
+    pub(crate) fn worn(&self, j: usize, play: usize, t: f64) -> f64 {
+        self.joints[j].wearing.at(play, t).0
+    }
+
+    /// Continues the wear of joint `j` with `worn` from `t` on, the end of a step; within the step the clearance stays as it was.
+    pub(crate) fn continue_wear(&mut self, j: usize, t: f64, worn: [Worn; 2]) {
+        let wearing = &mut self.joints[j].wearing;
+        *wearing = Wearing { starts: [wearing.starts[1], t], worn: [wearing.worn[1], worn] };
+        self.moves |= self.joints[j].moves();
+    }
+
+    /// Growth of play `play` of loose joint `j` by the power of sliding, as from [`Contact::sliding_power`], m/(N m); 0 if it does not
+    /// wear.
+    pub(crate) fn depth_by_work(&self, j: usize, play: usize) -> f64 {
+        let JointContacts { kind, parameters, .. } = &self.joints[j];
+        if parameters.wear_coefficient == 0.0 {
+            return 0.0;
+        }
+        kind.wearing_area(parameters, play).map_or(0.0, |area| parameters.wear_coefficient / area)
+    }
+
+    /// Updates moving clearances to `t`.
     #[inline]
-    fn update_ramps(&mut self, t: f64) {
-        if self.has_ramps {
-            self.follow_ramps(t);
+    fn move_clearances(&mut self, t: f64) {
+        if self.moves {
+            self.follow_moves(t);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn follow_ramps(&mut self, t: f64) {
-        for joint in &self.joints {
+    fn follow_moves(&mut self, t: f64) {
+        for joint in self.joints.iter().filter(|joint| joint.moves()) {
             for contact in &mut self.contacts[joint.contacts.clone()] {
                 let Contact { site, law, .. } = contact;
-                if let Some(ramp) = joint.ramps[site.play] {
-                    let (clearance, rate) = ramp.at(t);
+                let (set, ramp_rate) = joint.ramps[site.play].map_or((joint.plays[site.play], 0.0), |ramp| ramp.at(t));
+                let (worn, wear_rate) = joint.wearing.at(site.play, t);
+                let (clearance, rate) = (set + worn, ramp_rate + wear_rate);
+                if (clearance, rate) != (law.clearance, law.clearance_rate) {
                     site.stiffness.set_clearance(law, &joint.parameters, clearance, rate);
                 }
             }
@@ -268,7 +350,7 @@ impl Contacts {
         if self.contacts.is_empty() || matches!(at.active_set, ActiveSet::Nothing) {
             return;
         }
-        self.update_ramps(at.t);
+        self.move_clearances(at.t);
         loads.counts.contacts += 1;
         for contact in &mut self.contacts {
             if self.skips_inactive && !contact.may_carry_force(at.active_set) {
@@ -292,7 +374,7 @@ impl Contacts {
 
     /// Gap geometry at `t`, without forces.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
-        self.update_ramps(t);
+        self.move_clearances(t);
         for contact in &mut self.contacts {
             contact.measure(motion);
         }
@@ -300,7 +382,7 @@ impl Contacts {
 
     /// The same for contact `c` alone.
     pub fn measure_one(&mut self, c: ContactId, t: f64, motion: &[Kinematics]) {
-        self.update_ramps(t);
+        self.move_clearances(t);
         self.contacts[c].measure(motion);
     }
 

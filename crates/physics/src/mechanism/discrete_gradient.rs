@@ -71,9 +71,10 @@ struct SolvedRow {
     force: Vec3,
     force_before: Vec3,
     full_force: Vec3,
-    /// Mean normal force, N, and power dissipated by friction, W.
+    /// Mean normal force, N, power dissipated by friction, and normal force times sliding speed, W.
     normal_force: f64,
     friction_power: f64,
+    sliding_power: f64,
 }
 
 impl SolvedRow {
@@ -96,6 +97,7 @@ impl SolvedRow {
             full_force: Vec3::zeros(),
             normal_force: 0.0,
             friction_power: 0.0,
+            sliding_power: 0.0,
         }
     }
 
@@ -618,6 +620,12 @@ impl Mechanism {
         })
     }
 
+    /// Normal force times sliding speed in the latest such step, W, of each contact that touched.
+    pub(crate) fn discrete_sliding(&self) -> impl Iterator<Item = (ContactId, f64)> {
+        let rows = self.discrete.iter().flat_map(|discrete| &discrete.rows);
+        rows.filter_map(|row| Some((row.contact()?.0, row.sliding_power)))
+    }
+
     /// Powers over the latest such step.
     pub(crate) fn discrete_powers(&self) -> Powers {
         self.discrete.as_ref().map_or_else(Powers::default, |discrete| discrete.powers)
@@ -750,6 +758,7 @@ impl Evaluator<'_> {
             let stored = law.elastic.energy(end) - law.elastic.energy(start);
             row.normal_force = normal;
             row.friction_power = -(row.force + n * normal).dot(&s);
+            row.sliding_power = normal.max(0.0) * (s - n * n.dot(&s)).norm();
             powers.restitution += (normal * (end - start) - stored) / h;
             powers.friction += row.friction_power;
             // A clearance that shrinks also stiffens the contact.

@@ -48,7 +48,7 @@ use assembly::Settled;
 pub use assembly::{Assembly, Placement, UnstableRest};
 pub use bounds::{Advice, CostlyTask, LimitedQuantity, MAX_DENSE};
 pub use closed_form::{ClosedMotion, Unreachable};
-pub use contacts::{Contacts, Ramp};
+pub use contacts::{Contacts, Ramp, Worn};
 pub use discrete_gradient::StepStart;
 pub(crate) use drives::law_of;
 pub use drives::{Law, laws_of, periods_of};

@@ -83,6 +83,11 @@ impl Mechanism {
         contact.wall_contact(&self.model.joints[contact.site.joint].carrier, self.motion())
     }
 
+    /// Normal force times sliding speed of contact `c` at the latest evaluation, W.
+    pub(crate) fn sliding_power(&self, c: ContactId) -> f64 {
+        self.contacts.contact(c).sliding_power(self.motion())
+    }
+
     /// Where contact `c` touches, or would if it is near the wall, at the latest evaluation.
     pub(crate) fn spot(&self, c: ContactId) -> Spot {
         let contact = self.contacts.contact(c);

@@ -143,6 +143,21 @@ pub enum Doubt {
         /// Travel of the worst joint, m.
         travel: f64,
     },
+    /// A play worn so wide that areas and walls are no longer those of the start.
+    #[error(
+        "{joints}: its play has worn {} wider, more than a tenth of {}, of its radius or half its length: the areas over which it \
+         wears assume that it stays small.",
+        format_quantity_digits(*.depth, "mm", 4),
+        format_quantity_digits(*.size, "mm", 4)
+    )]
+    Worn {
+        /// Affected joints.
+        joints: AffectedJoints,
+        /// Worn depth, m.
+        depth: f64,
+        /// Radius of the ball or pin, or half the length of the block, m.
+        size: f64,
+    },
     /// More damping than in an undisturbed impact under the same law.
     #[error(
         "{joints}: at {time:.6} s a ball was hit again while in contact, and its damping reached {ratio:.2} times the elastic \
@@ -221,7 +236,7 @@ pub enum Doubt {
 
 impl Doubt {
     /// Short names of the kinds of doubt for files, indexed by [`Self::kind`].
-    pub const KINDS: [&str; 13] = [
+    pub const KINDS: [&str; 14] = [
         "settings",
         "unresolved impacts",
         "late contact",
@@ -235,6 +250,7 @@ impl Doubt {
         "works",
         "stability",
         "travel",
+        "worn",
     ];
 
     /// Its kind, an index into [`Self::KINDS`].
@@ -253,6 +269,7 @@ impl Doubt {
             Self::Gain { .. } | Self::Work { .. } => 10,
             Self::StabilityLimited { .. } => 11,
             Self::Travel { .. } => 12,
+            Self::Worn { .. } => 13,
         }
     }
 }

@@ -135,8 +135,10 @@ pub struct JointReport {
     pub axial: f64,
     /// Angle by which a pin's axis is tilted in its bearing, or a block in its guide, rad; 0 for a ball.
     pub tilt: f64,
-    /// Current clearance (a live change ramps it at a bounded rate), m.
+    /// Current clearance (a live change ramps it at a bounded rate), with its worn part, m.
     pub clearance: f64,
+    /// By how much it has worn wider since the start, m, and its second play.
+    pub worn: [f64; 2],
     /// Current second play, m: along the axis of a pin, across the second pair of walls of a guide; 0 if it has none.
     pub second_clearance: f64,
     /// delta = |e| - c, m (10), where it is deepest; 0 for an ideal joint.

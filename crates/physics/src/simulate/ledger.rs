@@ -21,7 +21,7 @@ pub struct Ledger {
     /// Dissipated by friction, from the velocities of the two points where it acts. It may be negative where friction uses
     /// the centres' velocity: the force then drives the surfaces.
     pub friction_loss: f64,
-    /// Supplied by clearances being ramped to a new value.
+    /// Supplied by clearances that are ramped to a new value or wear: those that grow take energy from the contacts.
     pub clearance_work: f64,
     /// Dissipated by the dampers of force elements.
     pub damping_loss: f64,
@@ -252,6 +252,17 @@ impl Account {
         self.powers = None;
         self.course.clear();
         self.past.clear();
+    }
+
+    /// Records that clearances moved at the end of the latest step, which leaves the motion unchanged; `energies` are those
+    /// with the new ones.
+    pub(super) fn record_moved_clearances(&mut self, energies: Energies) {
+        let (ledger, before) = &mut self.now;
+        let jump = energies.elastic - before.elastic;
+        ledger.clearance_work += jump;
+        ledger.elastic_change += jump;
+        ledger.exchanged += jump.abs();
+        *before = energies;
     }
 
     /// Sum of the magnitudes of the energies at the end of the latest step, J.

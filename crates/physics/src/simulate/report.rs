@@ -35,7 +35,7 @@ pub(super) fn fill(
     out.joints.clear();
     out.sites.clear();
     for (j, joint) in machine.loose_joints.iter().enumerate() {
-        out.joints.push(joint_report(mechanism, joint, contact_states, j));
+        out.joints.push(joint_report(mechanism, joint, contact_states, (j, time)));
         report_sites(mechanism, joint, j, &mut out.sites);
     }
     out.closing.clear();
@@ -57,7 +57,12 @@ pub(super) fn fill(
     }
 }
 
-fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[ContactState], j: usize) -> JointReport {
+fn joint_report(
+    mechanism: &Mechanism,
+    joint: &LooseJoint,
+    contact_states: &[ContactState],
+    (j, time): (usize, f64),
+) -> JointReport {
     let motion = mechanism.motion();
     let centre = |a: &Attachment| match a.body {
         None => a.point,
@@ -76,6 +81,7 @@ fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[Con
         axial,
         tilt,
         clearance: contacts.joint_clearance(j),
+        worn: [0, 1].map(|play| contacts.worn(j, play, time)),
         second_clearance: contacts.play(j, 1),
         ..JointReport::default()
     };

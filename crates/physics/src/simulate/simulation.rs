@@ -39,7 +39,7 @@ use super::{
 use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Controller, Polynomial};
 use crate::machine::{AppliedForces, Conditions, ControlFault, ElementNumber, LiveElements, Machine, Vec3};
-use crate::mechanism::{self, ContactId, Counts, EdgeIndicator, ElementReport, Flight, Mechanism, Pull, Ramp};
+use crate::mechanism::{self, ContactId, Counts, EdgeIndicator, ElementReport, Flight, Mechanism, Pull, Ramp, Worn};
 use adaptive::FullStep;
 use automatic::SchemeSelector;
 use corners::LawBranch;
@@ -134,9 +134,11 @@ pub struct State {
 struct JointState {
     /// Number of its contacts: none if it is ideal.
     contacts: usize,
-    /// Active ramp of each play, and the play without it, m.
+    /// Active ramp of each play, and the play without it, m; both without wear.
     ramps: [Option<Ramp>; 2],
     plays: [f64; 2],
+    /// By how much each play has worn wider.
+    worn: [Worn; 2],
     /// Reaction at the latest two instants, if the joint is ideal, for its peak between steps.
     reaction: Recent,
     /// Peak since it was last taken.
@@ -282,6 +284,8 @@ struct Attempt {
     may_contain_peak: bool,
     /// The same of the step just accepted.
     is_near_peak: bool,
+    /// Wear of each play of each joint over the step: at its quadrature nodes, then its growth, m, and the rate at its end, m/s.
+    wearing: Vec<wear::Growth>,
     /// Largest normal force of each contact, N, and the fraction of the step at which it occurs.
     peak_forces: Vec<(f64, f64)>,
     /// [`StepStart::rebounds`](crate::mechanism::StepStart::rebounds) of a discrete-gradient step.

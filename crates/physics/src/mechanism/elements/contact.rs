@@ -132,16 +132,29 @@ impl Contact {
         active_set.contact_state(self.id).is_some()
     }
 
+    /// Velocity of the surfaces against each other at the point of contact, m/s.
+    fn surface_velocity(&self, motion: &[Kinematics]) -> Vec3 {
+        let Separation { normal, distance, .. } = &self.gap.separation;
+        let levers = self.site.wall.levers(&self.law, *distance);
+        Coefficients::surface_velocity(normal, &self.gap.eccentricity_rate, self.spins(motion), levers)
+    }
+
     /// Power dissipated by friction, W.
     fn friction_power(&self, motion: &[Kinematics]) -> f64 {
-        let (gap, law) = (&self.gap, &self.law);
+        let gap = &self.gap;
         if gap.friction == Vec3::zeros() {
             return 0.0;
         }
-        let Separation { normal, distance, .. } = &gap.separation;
-        let levers = self.site.wall.levers(law, *distance);
-        let surfaces = Coefficients::surface_velocity(normal, &gap.eccentricity_rate, self.spins(motion), levers);
-        -gap.friction.dot(&surfaces)
+        -gap.friction.dot(&self.surface_velocity(motion))
+    }
+
+    /// Normal force times the sliding speed of the surfaces, whatever velocity friction uses, W: what wears them.
+    pub fn sliding_power(&self, motion: &[Kinematics]) -> f64 {
+        let gap = &self.gap;
+        if gap.normal_force <= 0.0 {
+            return 0.0;
+        }
+        gap.normal_force * gap.separation.sliding_velocity(&self.surface_velocity(motion)).norm()
     }
 
     /// What presses against the wall at the latest evaluation; `None` without contact force. `centre` is the point of the joint's

@@ -337,6 +337,8 @@ pub(super) const TABLE: &[Signal] = &[
 
     on_request("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap to the wall; negative in contact"),
     on_request("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),
+    on_request("@.worn", "@_worn_m", Joint(|joint| joint.worn[0]), "by how much the clearance has worn wider since the start"),
+    on_request("@.second_worn", "@_second_worn_m", Displacement(|joint| joint.worn[1]), "the same of the second play: along the axis of a pin, along z of a block"),
     on_request("@.slip_speed", "@_slip_speed_m_s", Joint(|joint| joint.slip_speed), "sliding speed that the friction law uses"),
 
     on_request("@.axial", "@_axial_m", Displacement(|joint| joint.axial), "displacement of the carried part along the joint's axis"),

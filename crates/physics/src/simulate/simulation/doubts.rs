@@ -10,6 +10,8 @@ use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm};
 const MAX_BELOW_SPEED_FLOOR: f64 = 0.5;
 /// Contact patch over ball radius beyond which Hertz theory, which treats the ball as a half-space, is far off.
 const MAX_PATCH: f64 = 1.0 / 3.0;
+/// Worn depth over the size of the joint beyond which its surfaces are no longer those of the start.
+const MAX_WORN: f64 = 0.1;
 /// Constraint violations above this fraction of the smallest clearance blur the effect of the clearance.
 const DRIFT_OF_CLEARANCE: f64 = 0.1;
 /// Limit on constraint violations if every joint with play is ideal, m.
@@ -88,6 +90,13 @@ impl DoubtContext<'_> {
             distance: statistics.joints[j].axial,
             travel: travel(j),
         }));
+        let depth = |j: usize| self.state.worn(j).into_iter().fold(0.0, f64::max);
+        let size = |j: usize| match self.machine.loose_joints[j].kind {
+            LooseKind::Slide(Slide { half_length, .. }) => half_length,
+            LooseKind::Ball | LooseKind::Pin(_) => self.machine.loose_joints[j].contact.ball_radius,
+        };
+        let worn = self.worst(MAX_WORN, |j| depth(j) / size(j));
+        doubts.extend(worn.map(|(joints, j)| Doubt::Worn { joints, depth: depth(j), size: size(j) }));
         let usual = |j: usize| self.coefficients(j).damping;
         let damping = self.worst(MAX_DAMPING, |j| statistics.joints[j].damping - usual(j));
         doubts.extend(damping.map(|(joints, j)| Doubt::Damping {

@@ -1,5 +1,6 @@
 //! Energy ledger of a running simulation, from powers at a few instants of each accepted step.
 
+use super::wear::{Growth, integrate_rates, record_rates};
 use super::{Record, State, Stepping};
 use crate::integrate::Method;
 use crate::mechanism::{ActiveSet, Mechanism, Powers};
@@ -33,13 +34,17 @@ impl Stepping<'_> {
         state.record.account.powers = None;
     }
 
-    /// Records the step just accepted, of size `h`, in the ledger and the wear map, with the contact state of the step;
+    /// Records the step just accepted, of size `h`, in the ledger and the wear map, and what it wore off, with the contact state of the step;
     /// `switched` if that has changed at its end.
     pub(super) fn record_step(&mut self, h: f64, switched: bool) {
         let Record { account, wear, .. } = &self.state.record;
         let has_ledger = account.on;
-        if !has_ledger && wear.is_none() {
+        let wears = self.mechanism.contacts.wears();
+        if !has_ledger && wear.is_none() && !wears {
             return;
+        }
+        if wears {
+            self.attempt.wearing.fill(Growth::default());
         }
         let located = self.locates();
         let Self { mechanism, state, before, scratch_k, .. } = self;
@@ -54,6 +59,9 @@ impl Stepping<'_> {
             account.course.clear();
             account.course.push(0.5, mechanism.discrete_powers());
             account.powers = None;
+            if wears {
+                self.integrate_mean_rates(h);
+            }
             self.begin_wear_of_step(false);
             if let Some(wear) = &mut self.state.record.wear {
                 for (c, contact) in self.mechanism.discrete_contacts() {
@@ -71,10 +79,12 @@ impl Stepping<'_> {
             scratch_k.copy_from_slice(&now.k);
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
+            let instants = self.stepper.quadrature();
+            record_rates(&mut self.attempt.wearing, instants.len() - 1, self.mechanism);
             if self.state.record.wear.is_some() {
                 let active_set = ActiveSet::by(located, &self.before.contact_states);
                 self.mechanism.complete_gaps(active_set, &self.state.now.y);
-                let (instants, known) = (self.stepper.quadrature(), self.state.record.account.powers.is_some());
+                let known = self.state.record.account.powers.is_some();
                 self.begin_wear_of_step(instants[0] == 0.0 && known);
                 if let Some(wear) = &mut self.state.record.wear {
                     wear.record_forces(instants.len() - 1, self.mechanism);
@@ -85,9 +95,12 @@ impl Stepping<'_> {
             let switched = switched || self.attempt.edge;
             let Record { account, wear, .. } = &mut self.state.record;
             account.powers = (!switched).then_some(end);
-            if let Some(wear) = wear {
-                let instants = self.stepper.quadrature();
-                wear.integrate_step(h, &weights(instants, 1.0)[..instants.len()]);
+            if wears || wear.is_some() {
+                let weights = &weights(instants, 1.0)[..instants.len()];
+                integrate_rates(&mut self.attempt.wearing, h, weights);
+                if let Some(wear) = wear {
+                    wear.integrate_step(h, weights);
+                }
             }
         }
         if has_ledger {
@@ -149,14 +162,15 @@ impl Stepping<'_> {
         // Bodies in flight are left out: only gravity acts on them.
         self.interpolate_stepped(theta, h);
         let located = self.locates();
-        let Self { mechanism, stepper, state, before, scratch_y, scratch_k, .. } = self;
+        let Self { mechanism, stepper, state, before, attempt, scratch_y, scratch_k, .. } = self;
         mechanism.forget_evaluation();
         let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
         let powers = evaluator.powers(before.t + theta * h, scratch_y, scratch_k);
+        // No quadrature node in a kinematic scene: nothing is in contact there.
+        let instant = stepper.quadrature().iter().position(|at| *at == theta).unwrap_or(0);
+        record_rates(&mut attempt.wearing, instant, mechanism);
         if let Some(wear) = &mut state.record.wear {
-            // No quadrature node in a kinematic scene: nothing is in contact there.
-            let instant = stepper.quadrature().iter().position(|at| *at == theta);
-            wear.record_forces(instant.unwrap_or(0), mechanism);
+            wear.record_forces(instant, mechanism);
         }
         powers
     }
@@ -180,7 +194,7 @@ impl Stepping<'_> {
 }
 
 /// Energies from the latest evaluation, at the current state.
-fn energies(mechanism: &Mechanism, state: &State) -> Energies {
+pub(super) fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let (kinetic, gravitational) = mechanism.energies();
     let contacts = &mechanism.contacts;
     let gaps = state.now.gaps.iter().enumerate();

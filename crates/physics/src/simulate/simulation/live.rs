@@ -103,6 +103,10 @@ impl Stepping<'_> {
             if self.state.conditions.joints[j] != *old {
                 self.change_contact(j);
             }
+            if self.state.conditions.joints[j].wear_coefficient != old.wear_coefficient {
+                // The next step finds the new rate.
+                self.state.joints[j].worn.iter_mut().for_each(|worn| worn.rate = 0.0);
+            }
         }
         if solver != before.solver {
             if other_method {
@@ -195,21 +199,23 @@ impl Stepping<'_> {
         }
     }
 
-    /// Sets a play of joint `j` to `next`, m, at once or by a ramp.
+    /// Sets a play of joint `j` to `next`, m, at once or by a ramp; what has worn off adds to it.
     fn change_play(&mut self, j: usize, play: usize, next: f64) {
         let Self { mechanism, state, attempt, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
+        let (set, worn) = (state.plays_without_wear(j)[play], state.worn(j)[play]);
         let now = mechanism.contacts.play(j, play);
         let distance = |c: ContactId| mechanism.contacts.gap(c).separation.penetration + now;
         let farthest = mechanism.contacts.of_play(j, play).map(distance).fold(0.0, f64::max);
-        let (ramp, clearance) = if next < now && farthest > next {
-            (Some(Ramp { start: state.now.t, from: now, rate: -CLEARANCE_SPEED, to: next }), now)
+        let (ramp, clearance) = if next < set && farthest > next + worn {
+            (Some(Ramp { start: state.now.t, from: set, rate: -CLEARANCE_SPEED, to: next }), set)
         } else {
             (None, next)
         };
         state.joints[j].ramps[play] = ramp;
         state.joints[j].plays[play] = clearance;
         // The wall has moved away from the ball. The state of a ball just arriving or leaving does not change.
+        let clearance = clearance + worn;
         for c in mechanism.contacts.of_play(j, play) {
             if clearance > now && state.now.contact_states[c].active && distance(c) <= clearance {
                 state.now.contact_states[c] = ContactState::default();

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::{OPEN_LOOP, Observations, Simulation, State, Stepping};
 use crate::integrate::System as _;
 use crate::machine::Formulation;
-use crate::mechanism::{ActiveSet, Coordinate, MechanismError};
+use crate::mechanism::{ActiveSet, Coordinate, MechanismError, Worn};
 use crate::simulate::StartError;
 
 /// Deepest penetration at a restart, as a fraction of the ball radius or what stands in its place, as at any start.
@@ -75,7 +75,7 @@ impl Simulation {
     }
 
     /// Begins anew at `time`, s, with coordinates and velocities `y`, ordered as in [`Self::state_vector`], under the conditions in
-    /// effect. Quaternions are normalised, loops closed, contacts found as at a start; counters, impacts, ledger and peaks begin
+    /// effect and with what has worn so far. Quaternions are normalised, loops closed, contacts found as at a start; counters, impacts, ledger and peaks begin
     /// again, and a pull or wear map ends.
     ///
     /// # Errors
@@ -108,8 +108,11 @@ impl Simulation {
         state.elements = self.state.elements.clone();
         state.now.t = time;
         state.control.grid_origin = time;
-        for (joint, contact) in state.joints.iter_mut().zip(&state.conditions.joints) {
+        for (joint, (contact, before)) in
+            state.joints.iter_mut().zip(state.conditions.joints.iter().zip(&self.state.joints))
+        {
             joint.plays = contact.clearances();
+            joint.worn = before.worn.map(|worn| Worn { rate: 0.0, ..worn });
         }
         self.state = state;
         self.workspace.attach_to(&self.model, &mut self.state);

@@ -7,8 +7,8 @@ use super::{
 };
 use crate::contact::{self, ContactPhase, ContactState};
 use crate::integrate::{Polynomial, Step};
-use crate::machine::{AppliedForces, Conditions, LiveElements};
-use crate::mechanism::{ContactId, Flight, Mechanism, Pull};
+use crate::machine::{AppliedForces, Conditions, LiveElements, Machine};
+use crate::mechanism::{ContactId, Flight, Mechanism, Pull, Worn};
 use crate::simulate::impacts::{ForcePeak, Impact, Impacts};
 use crate::simulate::ledger::{Account, Ledger};
 use crate::simulate::peaks::{Approach, Recent};
@@ -22,6 +22,7 @@ impl JointState {
             contacts: mechanism.contacts.of_joint(j).len(),
             ramps: [None; 2],
             plays: [0, 1].map(|play| mechanism.contacts.play(j, play)),
+            worn: [Worn::default(); 2],
             reaction: Recent::default(),
             peak: Peak::default(),
         }
@@ -147,8 +148,27 @@ impl State {
 
     /// Current plays of loose joint `j`, m; 0 where it is ideal.
     pub fn plays(&self, j: usize) -> [f64; 2] {
+        let worn = self.worn(j);
+        std::array::from_fn(|play| self.plays_without_wear(j)[play] + worn[play])
+    }
+
+    /// The same without what has worn off.
+    pub(super) fn plays_without_wear(&self, j: usize) -> [f64; 2] {
         let JointState { ramps, plays, .. } = &self.joints[j];
         [0, 1].map(|play| ramps[play].map_or(plays[play], |ramp| ramp.at(self.now.t).0))
+    }
+
+    /// How far each play of loose joint `j` has worn wider since the start, m.
+    pub fn worn(&self, j: usize) -> [f64; 2] {
+        self.joints[j].worn.map(|worn| worn.depth)
+    }
+
+    /// Volume worn off the walls of each play of loose joint `j` since the start, m^3: depth times area.
+    pub fn worn_volumes(&self, machine: &Machine, j: usize) -> [f64; 2] {
+        let (kind, contact) = (&machine.loose_joints[j].kind, &self.conditions.joints[j]);
+        let volume = |play: usize, depth: f64| kind.wearing_area(contact, play).map_or(0.0, |area| depth * area);
+        let [first, second] = self.worn(j);
+        [volume(0, first), volume(1, second)]
     }
 
     /// The pull of the hand, if any.
@@ -188,7 +208,7 @@ impl State {
     }
 
     /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each loose joint
-    /// whether each of its contacts touches and its approach speed (0 and 0 if it is ideal), and its current clearance, with the second, if it has one; then, of the angles that elements act on and
+    /// whether each of its contacts touches and its approach speed (0 and 0 if it is ideal), and its current clearance, with the second, if it has one, and the worn part of each that has worn; then, of the angles that elements act on and
     /// coordinates do not count, the number and the quarter turns of each that has at least two. The current branch of the friction law is excluded: like the step size, it belongs to
     /// the stepper.
     pub fn hash(&self) -> u64 {
@@ -215,6 +235,9 @@ impl State {
             add(first.to_bits());
             if second > 0.0 {
                 add(second.to_bits());
+            }
+            for worn in self.worn(j).into_iter().filter(|worn| *worn > 0.0) {
+                add(worn.to_bits());
             }
         }
         // Closer to 0 the poses determine the angle.
@@ -263,6 +286,7 @@ impl State {
             && self.elements.fits(model.machine())
             && model.machine().with_conditions(conditions, &self.elements).check().is_ok()
             && self.joints.iter().map(|joint| joint.contacts).eq(own.joints.iter().map(|joint| joint.contacts))
+            && self.joints.iter().flat_map(|joint| joint.worn).all(|worn| worn.depth >= 0.0)
             && self.contacts.len() == contacts
             && self.flights.len() == own.flights.len()
             // Only a window has a hand.

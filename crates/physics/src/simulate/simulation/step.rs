@@ -2,6 +2,7 @@
 
 use super::discrete::discrete_size;
 use super::flights::{clear_flights, write_flights};
+use super::wear::Growth;
 use super::{
     Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, SHORTEST_KINEMATIC_STEP, State, StepEnd, Stepping, Workspace,
     store_gaps,
@@ -31,6 +32,7 @@ impl Attempt {
             events: ImpactEvents::new(contacts),
             may_contain_peak: false,
             is_near_peak: false,
+            wearing: vec![Growth::default(); machine.loose_joints.len()],
             peak_forces: vec![(0.0, 0.0); contacts],
             rebounds: vec![None; contacts],
             stiffness: 0.0,
@@ -327,6 +329,7 @@ impl Stepping<'_> {
         }
         self.search_peaks();
         self.count_turns();
+        self.wear_walls();
         Ok(())
     }
 

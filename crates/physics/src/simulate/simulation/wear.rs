@@ -1,7 +1,50 @@
-//! The wear map of a running simulation.
+//! Wear of a running simulation: the map of it, and the clearances that it widens.
+//!
+//! A play grows at k N |v| over its area ([`LooseKind::wearing_area`](crate::machine::LooseKind::wearing_area)). During a step it grows at
+//! the rate found at the step's start, so that a steady contact sees its wall recede evenly. What it has grown by at the end is the
+//! quadrature of the rate over the step, with the nodes of the energy ledger: the small difference, of second order in the step, moves the
+//! wall at its end, and the elastic energy that this takes is work of the clearance.
 
-use super::Stepping;
+use super::energy::energies;
+use super::{Stepping, store_gaps};
+use crate::contact::ContactState;
+use crate::integrate::System as _;
+use crate::mechanism::{ActiveSet, Mechanism, Worn};
 use crate::simulate::Wear;
+
+/// Wear of the plays of a joint over a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Growth {
+    /// Rates at the quadrature nodes, m/s.
+    nodes: [[f64; 2]; 3],
+    /// Over the step, m.
+    depth: [f64; 2],
+    /// At its end, m/s.
+    rate: [f64; 2],
+}
+
+/// Records the rates of the latest evaluation of `mechanism` at node `instant` of the step.
+pub(super) fn record_rates(wearing: &mut [Growth], instant: usize, mechanism: &Mechanism) {
+    if !mechanism.contacts.wears() {
+        return;
+    }
+    for c in 0..mechanism.contacts.len() {
+        let power = mechanism.sliding_power(c);
+        if power > 0.0 {
+            let (j, play) = (mechanism.contacts.joint_of(c), mechanism.contacts.play_of(c));
+            wearing[j].nodes[instant][play] += power * mechanism.contacts.depth_by_work(j, play);
+        }
+    }
+}
+
+/// Integrates the recorded rates over a step of size `h` with the quadrature weights `weights`.
+pub(super) fn integrate_rates(wearing: &mut [Growth], h: f64, weights: &[f64]) {
+    for Growth { nodes, depth, rate } in wearing {
+        *rate = nodes[weights.len() - 1];
+        *depth =
+            [0, 1].map(|play| h * weights.iter().zip(&*nodes).map(|(weight, node)| weight * node[play]).sum::<f64>());
+    }
+}
 
 impl Stepping<'_> {
     /// As [`Simulation::track_wear`](crate::simulate::Simulation::track_wear).
@@ -16,5 +59,69 @@ impl Stepping<'_> {
         wear.commit_step();
         wear.record_forces(0, self.mechanism);
         self.state.record.wear = Some(wear);
+    }
+
+    /// Finds the wear of a step of size `h` of the discrete-gradient method from its means over the step.
+    pub(super) fn integrate_mean_rates(&mut self, h: f64) {
+        for (c, power) in self.mechanism.discrete_sliding() {
+            let (j, play) = (self.mechanism.contacts.joint_of(c), self.mechanism.contacts.play_of(c));
+            let rate = power * self.mechanism.contacts.depth_by_work(j, play);
+            let growth = &mut self.attempt.wearing[j];
+            growth.depth[play] += h * rate;
+            // What has left its wall wears it no more.
+            growth.rate[play] += if self.state.now.gaps[c].penetration > 0.0 { rate } else { 0.0 };
+        }
+    }
+
+    /// Widens the plays by what wore off in the step just accepted.
+    pub(super) fn wear_walls(&mut self) {
+        if !self.mechanism.contacts.wears() {
+            return;
+        }
+        let located = self.locates();
+        let Self { mechanism, state, attempt, .. } = self;
+        let t = state.now.t;
+        let mut moved = false;
+        for (j, growth) in attempt.wearing.iter().enumerate() {
+            let worn = &mut state.joints[j].worn;
+            let rates = worn.map(|worn| worn.rate);
+            if [growth.depth, growth.rate, rates] == [[0.0; 2]; 3] {
+                continue;
+            }
+            moved = true;
+            for (play, worn) in worn.iter_mut().enumerate() {
+                *worn = Worn { depth: worn.depth + growth.depth[play], rate: growth.rate[play] };
+            }
+            mechanism.contacts.continue_wear(j, t, *worn);
+        }
+        if !moved {
+            return;
+        }
+        mechanism.forget_evaluation();
+        let now = &mut state.now;
+        if self.stepper.has_mean_rates() {
+            mechanism.measure(t, &now.y);
+        } else {
+            let active_set = ActiveSet::by(located, &now.contact_states);
+            let mut evaluator = mechanism.evaluator(active_set);
+            evaluator.derivative(t, &now.y, &mut now.k);
+            state.record.statistics.count(evaluator.counts);
+            mechanism.complete_gaps(active_set, &now.y);
+        }
+        store_gaps(mechanism, &mut now.gaps);
+        for (c, gap) in now.gaps.iter().enumerate() {
+            let contact_state = &mut now.contact_states[c];
+            // The wall has moved away from what does not follow it.
+            if contact_state.active && gap.penetration <= 0.0 && gap.rate <= 0.0 {
+                *contact_state = ContactState::default();
+                state.record.impacts.change(c, false, t, &mut attempt.events);
+            }
+        }
+        if state.record.account.on {
+            let energies = energies(mechanism, state);
+            state.record.account.record_moved_clearances(energies);
+        }
+        state.record.account.powers = None;
+        mechanism.forget_evaluation();
     }
 }

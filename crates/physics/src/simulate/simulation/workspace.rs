@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::automatic::prepare_implicit;
-use super::{Attempt, Model, State, StepEnd, Workspace, WorkspaceId};
+use super::{Attempt, JointState, Model, State, StepEnd, Workspace, WorkspaceId};
 use crate::contact::ContactState;
 use crate::integrate::Method;
 use crate::mechanism::Mechanism;
@@ -97,8 +97,8 @@ pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &
     }
     for (j, contact) in state.conditions.joints.iter().enumerate() {
         if !contact.is_ideal() {
-            mechanism.contacts.set_ramps(j, state.joints[j].ramps);
-            mechanism.contacts.set_parameters(j, contact, state.joints[j].plays);
+            let JointState { plays, ramps, worn, .. } = state.joints[j];
+            mechanism.contacts.set_joint(j, contact, (plays, ramps), (state.now.t, worn));
         }
     }
 }

@@ -1,0 +1,349 @@
+//! Wear that widens the play (Archard 1953): closed forms, the balance of the worn volume, the ledger, states and live changes.
+
+use std::f64::consts::PI;
+
+use crate::common::{Changes, METHODS, frame_now, parse, replaced, run_until};
+use jointplay_physics::simulate::{Effect, Simulation};
+use jointplay_scene::{LiveScene, SavedState};
+
+/// A pin of 1 kg, 10 mm in radius and 24 mm long, that turns in its bearing at 100 rad/s, where it rests on the wall from the start: so deep
+/// that each end bears half of its weight of 10 N.
+const PIN: &str = r#"
+    gravity = { x = 0, y = 0, z = "-10 m/s^2" }
+    [contact]
+    friction_law = "none"
+    friction = 0.2
+    wear_coefficient = "1e-8 m^2/N"
+    [solver]
+    method = "dopri5"
+    tolerance = 1e-9
+    [[body]]
+    name = "pin"
+    mass = "1 kg"
+    inertia = "5e-5 1.6e-4 1.6e-4 kg m^2"
+    [[joint]]
+    name = "J"
+    kind = "revolute"
+    child = "pin"
+    axis = [1, 0, 0]
+    play = { radial = "0.1 mm", length = "24 mm", radius = "10 mm", ends = "pin", stiffness = "1e10 N/m^1.5" }
+    start = { velocity = "100 rad/s", offset = "0 0 -0.101 mm" }
+"#;
+
+/// One joint of each kind, thrown about in its play: a ball, a pin with collars, a piston, and a block.
+const KINDS: &str = r#"
+    gravity = { x = 0, y = 0, z = "-10 m/s^2" }
+    [contact]
+    friction = 0.02
+    wear_coefficient = "1e-8 m^2/N"
+    [solver]
+    method = "dopri5"
+    tolerance = 1e-9
+    [[body]]
+    name = "bob"
+    mass = "0.1 kg"
+    inertia = "4e-6 4e-6 4e-6 kg m^2"
+    [[joint]]
+    name = "bob"
+    kind = "free"
+    child = "bob"
+    start = { position = "0 0 0 mm", velocity = "0.03 0.05 -0.1 m/s", angular_velocity = "20 30 5 rad/s" }
+    [[ball_joint]]
+    name = "ball"
+    socket = { body = "world" }
+    ball = { body = "bob" }
+    [[body]]
+    name = "pin"
+    mass = "0.1 kg"
+    inertia = "5e-6 1.6e-5 1.6e-5 kg m^2"
+    [[joint]]
+    name = "collars"
+    kind = "revolute"
+    child = "pin"
+    parent_point = "0 0.2 0 m"
+    axis = [1, 0, 0]
+    play = { radial = "0.1 mm", axial = "0.05 mm", length = "24 mm", radius = "10 mm", face_radius = "15 mm" }
+    start = { velocity = "20 rad/s", offset_velocity = "0.3 0.1 -0.2 m/s", tilt_velocity = "0 3 -2 rad/s" }
+    [[body]]
+    name = "piston"
+    mass = "0.2 kg"
+    inertia = "3e-5 3e-5 3e-5 kg m^2"
+    [[joint]]
+    name = "bore"
+    kind = "cylindrical"
+    child = "piston"
+    parent_point = "0 0.4 0 m"
+    axis = [0, 1, 0]
+    play = { radial = "0.05 mm", length = "30 mm", radius = "12 mm", ends = "pin" }
+    start = { velocity = "0.1 m/s", angular_velocity = "15 rad/s", offset_velocity = "0.1 0 0.05 m/s" }
+    [[body]]
+    name = "block"
+    mass = "0.2 kg"
+    inertia = "3e-5 3e-5 3e-5 kg m^2"
+    [[joint]]
+    name = "guide"
+    kind = "prismatic"
+    child = "block"
+    parent_point = "0 0.6 0 m"
+    axis = [1, 0, 0]
+    play = { y = "0.05 mm", z = "0.1 mm", half_length = "25 mm", half_y = "20 mm", half_z = "10 mm" }
+    start = { velocity = "0.5 m/s", offset_velocity = "0 0.1 0.2 m/s" }
+"#;
+
+/// 2 pi r L, m^2; and its rate of depth, k N w r / A, m/s.
+const AREA: f64 = 2.0 * PI * 0.01 * 0.024;
+const RATE: f64 = 1e-8 * 10.0 * 100.0 * 0.01 / AREA;
+
+/// The pin, which sinks as fast as its bearing wears, so that nothing oscillates.
+fn sinking() -> String {
+    let velocity = format!("offset = \"0 0 -0.101 mm\", offset_velocity = \"0 0 -{RATE} m/s\"");
+    replaced(PIN, "offset = \"0 0 -0.101 mm\"", &velocity)
+}
+
+fn start(text: &str, changes: &Changes) -> LiveScene {
+    LiveScene::new(&parse(text, changes)).unwrap()
+}
+
+/// Run of a scene by a method.
+fn run_by(method: &str, text: &str, changes: &Changes, end: f64) -> LiveScene {
+    let changes: Vec<_> = [("solver.method", method)].iter().chain(changes).copied().collect();
+    let mut simulation = start(text, &changes);
+    run_until(&mut simulation, end);
+    simulation
+}
+
+fn worn(simulation: &Simulation) -> f64 {
+    simulation.state().worn(0)[0]
+}
+
+#[test]
+fn a_turning_pin_under_its_weight_wears_by_the_closed_form() {
+    for method in METHODS {
+        let mut simulation = run_by(method, &sinking(), &[], 0.1);
+        let (got, expected) = (worn(&simulation), RATE * 0.1);
+        let volume = simulation.state().worn_volumes(simulation.machine(), 0)[0];
+        println!("{method}: {:e}, {} steps", got / expected - 1.0, simulation.statistics().steps);
+        assert!((volume / (1e-8 * 10.0 * 1.0 * 0.1) - 1.0).abs() < 1e-9, "{method}: {volume:e}");
+        assert!((got / expected - 1.0).abs() < 1e-9, "{method}");
+        let frame = frame_now(&mut simulation);
+        assert_eq!(frame.joints[0].worn, [got, 0.0]);
+        assert_eq!(frame.joints[0].clearance, 1e-4 + got);
+    }
+}
+
+/// What friction has dissipated at each joint, from a wear map, J.
+fn friction_work(simulation: &Simulation, j: usize) -> f64 {
+    simulation.wear().unwrap().cells(j).iter().map(|cell| cell.friction_work).sum()
+}
+
+#[test]
+fn the_worn_volume_is_the_work_of_friction_over_its_coefficient() {
+    // All slides faster than the ramp of friction, so that its power is c_f N |v|: two quadratures of the same integral.
+    for method in METHODS {
+        let scene = parse(KINDS, &[("solver.method", method)]);
+        let mut simulation = LiveScene::new(&scene).unwrap();
+        simulation.track_wear();
+        run_until(&mut simulation, 0.004);
+        simulation.commit_wear();
+        // Friction of the discrete-gradient method opposes the sliding at the end of a step, its work has the mean.
+        let tolerance = if method == "discrete-gradient" { 1e-3 } else { 1e-11 };
+        let mut total = 0.0;
+        for (j, joint) in scene.machine.loose_joints.iter().enumerate() {
+            let volume: f64 = simulation.state().worn_volumes(simulation.machine(), j).iter().sum();
+            let expected = 1e-8 / 0.02 * friction_work(&simulation, j);
+            println!("{method} {}: {volume:e} {:e}", joint.name, volume / expected - 1.0);
+            assert!(expected > 1e-12, "{method} {}", joint.name);
+            assert!((volume / expected - 1.0).abs() < tolerance, "{method} {}: {volume:e} {expected:e}", joint.name);
+            total += volume;
+        }
+        let loss = simulation.ledger().unwrap().friction_loss;
+        assert!((total * 0.02 / 1e-8 / loss - 1.0).abs() < tolerance, "{method}: {total:e} {loss:e}");
+    }
+}
+
+#[test]
+fn areas_are_those_of_the_surfaces_that_share_a_play() {
+    // mm^2: the sphere; the cylinder, and the rings of two collars; the cylinder; two faces of 50 x 20 and of 50 x 40 mm.
+    let expected = [
+        ("ball", 0, 4.0 * PI * 100.0),
+        ("collars", 0, 2.0 * PI * 10.0 * 24.0),
+        ("collars", 1, 2.0 * PI * (225.0 - 100.0)),
+        ("bore", 0, 2.0 * PI * 12.0 * 30.0),
+        ("guide", 0, 2.0 * 50.0 * 20.0),
+        ("guide", 1, 2.0 * 50.0 * 40.0),
+    ];
+    let machine = parse(KINDS, &[]).machine;
+    for (name, play, area) in expected {
+        let joint = machine.loose_joints.iter().find(|joint| joint.name == name).unwrap();
+        let got = joint.kind.wearing_area(&joint.contact, play).unwrap();
+        assert!((got / (1e-6 * area) - 1.0).abs() < 1e-14, "{name} {play}: {got:e}");
+    }
+}
+
+#[test]
+fn methods_agree_on_what_wears() {
+    let wear = ("contact.wear_coefficient", "1e-9 m^2/N");
+    let reference = run_by("radau5", KINDS, &[wear, ("solver.tolerance", "1e-11")], 0.004);
+    let cases = [
+        ("dopri5", ("solver.tolerance", "1e-10"), 1e-4),
+        ("automatic", ("solver.tolerance", "1e-10"), 1e-4),
+        ("radau5", ("solver.tolerance", "1e-9"), 1e-4),
+        ("rk4", ("solver.step", "0.5 us"), 1e-4),
+        ("discrete-gradient", ("solver.steps_per_impact", "160"), 1e-3),
+    ];
+    for (method, accuracy, tolerance) in cases {
+        let got = run_by(method, KINDS, &[wear, accuracy], 0.004);
+        for j in 0..4 {
+            for (got, expected) in got.state().worn(j).into_iter().zip(reference.state().worn(j)) {
+                println!("{method} {j}: {expected:e} {:e}", got - expected);
+                assert!((got - expected).abs() <= tolerance * expected, "{method} {j}: {got:e} {expected:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_ledger_is_closed_as_without_wear() {
+    for method in METHODS {
+        let residual = |wear: &str| {
+            let changes = [("contact.wear_coefficient", wear), ("solver.step", "1 us")];
+            let simulation = run_by(method, KINDS, &changes, 0.01);
+            let ledger = *simulation.ledger().unwrap();
+            (ledger.share(), ledger.clearance_work)
+        };
+        let ((without, none), (with, work)) = (residual("0"), residual("1e-8 m^2/N"));
+        println!("{method}: {without:e}, with wear {with:e}, work {work:e}");
+        assert!(none.abs() < 1e-15, "{method}: {none:e}");
+        assert!(work < -1e-7, "{method}: {work:e}");
+        assert!(with < 1.5 * without + 1e-8, "{method}: {without:e} {with:e}");
+    }
+}
+
+#[test]
+fn a_run_continues_from_a_saved_state_with_the_same_bits() {
+    const WRITER: [&str; 2] = ["jointplay", "test"];
+    for method in METHODS {
+        let mut simulation = run_by(method, KINDS, &[], 0.002);
+        let snapshot = simulation.snapshot();
+        let text = SavedState::write(WRITER, simulation.pending(), &snapshot, simulation.time()).unwrap();
+        assert!(worn(&simulation) > 0.0 && simulation.state().worn(1)[0] > 0.0);
+        run_until(&mut simulation, 0.003);
+
+        let saved = SavedState::read(WRITER, text.as_bytes()).unwrap();
+        let mut resumed = start(KINDS, &[("solver.method", method)]);
+        resumed.resume(&saved.snapshot).unwrap();
+        run_until(&mut resumed, 0.003);
+        assert_eq!(resumed.state(), simulation.state(), "{method}");
+
+        let mut back = run_by(method, KINDS, &[], 0.001);
+        back.restore(&snapshot);
+        run_until(&mut back, 0.003);
+        assert_eq!(back.state(), simulation.state(), "{method}");
+    }
+}
+
+#[test]
+fn until_something_has_worn_the_hash_is_that_without_wear() {
+    let [mut none, mut some] = ["0", "1e-8 m^2/N"].map(|wear| start(KINDS, &[("contact.wear_coefficient", wear)]));
+    assert_eq!(none.state_hash(), some.state_hash());
+    // In free flight and up to the first impact nothing differs, and nothing is evaluated more often.
+    while none.statistics().impacts() == 0 {
+        none.step().unwrap();
+        some.step().unwrap();
+        assert_eq!(none.state_hash(), some.state_hash());
+    }
+    assert_eq!(none.statistics().evaluations, some.statistics().evaluations);
+    for _ in 0..5 {
+        none.step().unwrap();
+        some.step().unwrap();
+    }
+    assert_ne!(none.state_hash(), some.state_hash());
+}
+
+#[test]
+fn changed_wear_and_changed_play_act_from_now_on() {
+    for method in METHODS {
+        let mut simulation = run_by(method, &sinking(), &[], 0.02);
+        let before = worn(&simulation);
+        // Four times the wear: from rest a little later, as the pin must first fall faster.
+        assert_eq!(simulation.set("contact.wear_coefficient", "4e-8 m^2/N"), Ok(Effect::Now));
+        run_until(&mut simulation, 0.04);
+        let faster = worn(&simulation);
+        assert!((before / (0.02 * RATE) - 1.0).abs() < 1e-9, "{method}");
+        assert!(((faster - before) / (0.08 * RATE) - 1.0).abs() < 2e-3, "{method}: {:e}", faster - before);
+        // More play: the pin falls the rest of the way, and wears the wall as before. The worn part stays.
+        assert_eq!(simulation.set("joint.J.play.radial", "0.12 mm"), Ok(Effect::Now));
+        assert_eq!(worn(&simulation), faster);
+        let frame = frame_now(&mut simulation);
+        assert_eq!((frame.joints[0].clearance, frame.joints[0].worn[0]), (1.2e-4 + faster, faster));
+        run_until(&mut simulation, 0.05);
+        // Less play ramps the wall, which goes on wearing.
+        let between = worn(&simulation);
+        assert!(between > faster, "{method}");
+        assert_eq!(simulation.set("joint.J.play.radial", "0.1 mm"), Ok(Effect::Now));
+        run_until(&mut simulation, 0.07);
+        let after = worn(&simulation);
+        assert!(after > between, "{method}");
+        assert!((simulation.state().plays(0)[0] - (1e-4 + after)).abs() < 1e-18, "{method}");
+        // And without it nothing more.
+        assert_eq!(simulation.set("contact.wear_coefficient", "0"), Ok(Effect::Now));
+        run_until(&mut simulation, 0.08);
+        assert_eq!(worn(&simulation), after, "{method}");
+        assert!(simulation.ledger().unwrap().share() < 1e-6, "{method}: {:e}", simulation.ledger().unwrap().share());
+    }
+}
+
+#[test]
+fn a_run_with_the_worn_depth_in_its_play_continues_another() {
+    let run = run_by("dopri5", &sinking(), &[], 0.02);
+    let depth = worn(&run);
+    let wider = format!("{} m", 1e-4 + depth);
+    let fresh = replaced(
+        &replaced(&sinking(), "radial = \"0.1 mm\"", &format!("radial = \"{wider}\"")),
+        "-0.101 mm",
+        &format!("{} mm", -0.101 - 1e3 * depth),
+    );
+    let again = run_by("dopri5", &fresh, &[], 0.02);
+    let straight = run_by("dopri5", &sinking(), &[], 0.04);
+    assert!((depth + worn(&again) - worn(&straight)).abs() < 1e-9 * worn(&straight));
+}
+
+#[test]
+fn joints_without_a_wearing_surface_are_refused() {
+    let refused = |text: &str, words: [&str; 4]| {
+        let error = jointplay_scene::Scene::parse(text, None, &[]).expect_err(text).to_string();
+        for word in words {
+            assert!(error.contains(word), "{error}\nlacks {word}");
+        }
+    };
+    let planar = replaced(PIN, "length = \"24 mm\"", "planar = true");
+    refused(&planar, ["wear_coefficient", "1e-8 m^2/N", "planar pin", "allowed without it 0 m^2/N"]);
+    let line = replaced(&planar, "planar = true", "planar = true, length = \"24 mm\", elastic = \"line\"");
+    let line = replaced(&line, ", stiffness = \"1e10 N/m^1.5\"", "");
+    assert_eq!(
+        parse(&line, &[]).machine.loose_joints[0]
+            .kind
+            .wearing_area(&parse(&line, &[]).machine.loose_joints[0].contact, 0),
+        Some(AREA)
+    );
+    let collars = replaced(KINDS, ", face_radius = \"15 mm\"", "");
+    refused(&collars, ["wear_coefficient", "face_radius", "collars", "0 m^2/N"]);
+    let block = replaced(KINDS, "z = \"0.1 mm\", ", "planar = true, ").replace(", half_z = \"10 mm\"", "");
+    refused(&block, ["wear_coefficient", "planar block", "guide", "0 m^2/N"]);
+    let beyond = replaced(PIN, "1e-8 m^2/N", "1 m^2/N");
+    refused(&beyond, ["wear_coefficient", "1 m^2/N", "allowed", "1e-6"]);
+    // The same in the unit of the literature.
+    let mm = parse(&replaced(PIN, "1e-8 m^2/N", "10 mm^3/(N m)"), &[]);
+    assert_eq!(mm.machine.loose_joints[0].contact.wear_coefficient, 1e-8);
+}
+
+#[test]
+fn a_play_worn_wide_is_doubted() {
+    let doubts = |wear: &str| {
+        let run = run_by("dopri5", PIN, &[("contact.wear_coefficient", wear)], 0.2);
+        run.doubts().iter().map(ToString::to_string).collect::<String>()
+    };
+    assert!(!doubts("1e-8 m^2/N").contains("worn"));
+    let deep = doubts("1e-6 m^2/N");
+    assert!(deep.contains("J: its play has worn") && deep.contains("a tenth of 10 mm"), "{deep}");
+}
