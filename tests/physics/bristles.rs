@@ -303,6 +303,19 @@ fn the_law_changes_at_a_reset_and_its_numbers_at_once() {
     }
 }
 
+/// It swings along its guide on its bristles: two at the corners that press, and their damping.
+#[test]
+fn what_sticks_is_linearised_with_its_stiffness() {
+    let mut run = run(&block("-9.81 m/s^2", "", ""), &[]);
+    run.advance_to(1.0).unwrap();
+    let (k, d, mass) = (2e8_f64, 4e3, 1.0);
+    let expected = (k / mass - (0.5 * d / mass) * (0.5 * d / mass)).sqrt();
+    let eigenvalues = run.linearise().unwrap().matrix.complex_eigenvalues();
+    println!("{eigenvalues} {expected}");
+    let nearest = eigenvalues.iter().map(|value| (value.im / expected - 1.0).abs()).fold(f64::INFINITY, f64::min);
+    assert!(nearest < 1e-3, "{nearest:e}");
+}
+
 /// A block in a guide 50 mm from the vertical axis of a table that turns at 3 rad/s: its bristles bear 0.45 N and turn with the guide.
 #[test]
 fn what_sticks_turns_with_its_carrier() {

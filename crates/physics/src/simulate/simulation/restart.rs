@@ -198,6 +198,7 @@ impl Simulation {
             // As long as the coordinate's scale lasts for the one that moves most by its own.
             let most = direction.iter().zip(&scale).map(|(x, scale)| (x / scale).abs()).fold(0.0, f64::max);
             let size = DIFFERENCE / most;
+            let bent = run.bent_by(t, &y, &(direction * size));
             for (column, of_velocity) in [(k, false), (count + k, true)] {
                 let mut change = DVector::zeros(directions.nrows());
                 for sign in [1.0, -1.0] {
@@ -207,6 +208,7 @@ impl Simulation {
                         moved[velocities.clone()].iter_mut().zip(&step).for_each(|(v, step)| *v += step);
                     } else {
                         run.mechanism.displace(&mut moved, &step);
+                        moved[velocities.end..].iter_mut().zip(&bent).for_each(|(z, bent)| *z += sign * bent);
                     }
                     let open = run.mechanism.project(t, &mut moved);
                     if !(open <= OPEN_LOOP) {
@@ -229,6 +231,21 @@ impl Simulation {
 }
 
 impl Stepping<'_> {
+    /// How far the displacement `step`, in velocity space, bends the bristles at rest at (`t`, `y`), m: their rates at that displacement
+    /// per second.
+    fn bent_by(&mut self, t: f64, y: &[f64], step: &DVector<f64>) -> Vec<f64> {
+        let velocities = self.mechanism.velocity_range();
+        let mut moving = y.to_vec();
+        let mut rates = |speed: f64| {
+            moving[velocities.clone()].iter_mut().zip(step.iter()).for_each(|(v, step)| *v = speed * step);
+            let mut dy = vec![0.0; moving.len()];
+            self.immediate_derivative(t, &moving, &mut dy);
+            dy.split_off(velocities.end)
+        };
+        let [at_rest, moved] = [rates(0.0), rates(1.0)];
+        moved.iter().zip(at_rest).map(|(moved, at_rest)| moved - at_rest).collect()
+    }
+
     /// The derivative at (`t`, `y`), with every closed contact active.
     fn immediate_derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.with_all_bodies(|run| {

@@ -66,6 +66,7 @@ impl Stepping<'_> {
     /// Completes the start: contacts, derivative, first peaks, ledger.
     pub(super) fn begin(&mut self) -> Result<(), StartError> {
         self.begin_contacts_at_start();
+        self.mechanism.release_bristles(&mut self.state.now.y, &self.state.now.contact_states);
         self.choose_first_scheme();
         self.refresh();
         self.state.record.determinant_positive = self.mechanism.is_determinant_positive();
