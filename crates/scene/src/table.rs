@@ -216,7 +216,7 @@ static TABLE: [Parameter; 30] = [
     contact_number!(
         stribeck_speed,
         "Stribeck speed",
-        logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
+        logarithmic(D::Speed, 1e-6, 10.0, "mm/s", (1e-5, 0.1)),
         "v_s of the friction law bristle: at this sliding speed friction has fallen 63 % of the way from its static to \
          its sliding value. Without effect at a static friction ratio of 1.",
         "Dupont et al. (2002), eq. 9",
@@ -224,17 +224,18 @@ static TABLE: [Parameter; 30] = [
     contact_number!(
         bristle_stiffness,
         "Bristle stiffness",
-        logarithmic(D::Stiffness, 1e3, 1e12, "N/mm", (1e5, 1e9)),
-        "Tangential stiffness of a sticking contact of the friction law bristle. It yields by the load over this \
-         number before it slides. Steel surfaces have some 1e7 N/m at loads of some newtons and more at larger ones.",
-        "Gonthier et al. (2004)",
+        logarithmic(D::Stiffness, 1e4, 1e11, "N/mm", (1e6, 1e10)),
+        "Tangential stiffness of a sticking contact of the friction law bristle: it yields by the load over this number \
+         before it slides. Mindlin gives 0.82 times the stiffness of the normal force at the load, for a Poisson's \
+         ratio of 0.3.",
+        "Gonthier et al. (2004); Mindlin (1949)",
     ),
     contact_number!(
         bristle_damping,
         "Bristle damping",
-        logarithmic(D::Damping, 1e-3, 1e9, "N s/m", (1.0, 1e5)),
-        "Damping of a sticking contact of the friction law bristle, so that what sticks stops ringing. It acts below \
-         the limit of friction only.",
+        logarithmic(D::Damping, 1.0, 1e6, "N s/m", (10.0, 1e5)),
+        "Damping of a sticking contact of the friction law bristle, so that what sticks stops ringing. Over the \
+         stiffness it is the time in which friction turns and follows its limit. It acts below the limit of friction only.",
         "Gonthier et al. (2004)",
     ),
     contact_number!(
