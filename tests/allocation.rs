@@ -116,15 +116,12 @@ fn joints_with_two_degrees_of_freedom_closing_joints_and_every_kind_of_play_allo
         include_str!("fuzz/corpus/good-pins.toml"),
         include_str!("fuzz/corpus/good-block.toml"),
         include_str!("fuzz/corpus/good-planar-play.toml"),
+        include_str!("fuzz/corpus/good-wear.toml"),
     ];
-    // The pins wear, too.
-    let wearing = ("contact.wear_coefficient", "1e-10 m^2/N");
-    let none = ("contact.wear_coefficient", "0");
-    let cases = corpus.map(|text| (text, none)).into_iter().chain([(corpus[2], wearing)]);
-    for (text, wear) in cases {
+    for text in corpus {
         for method in METHODS {
             for form in ["tree", "lagrange"] {
-                let changes = [("formulation", form), ("solver.method", method), wear];
+                let changes = [("formulation", form), ("solver.method", method)];
                 let mut simulation = Simulation::new(&common::parse(text, &changes).machine).unwrap();
                 let mut frame = Frame::default();
                 simulation.track_wear();

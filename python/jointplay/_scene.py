@@ -340,7 +340,8 @@ class Run(Mapping[str, NDArray[np.float64]]):
         self.ledger: dict[str, float] | None = results["ledger"]
         """Energy exchanged, J, as in the summary of `jointplay run`; None if `solver.energy_ledger` is off."""
         self.statistics: dict[str, Any] = results["statistics"]
-        """Steps, evaluations and rejected steps; under `joints` the `peak_normal`, N, `peak_time`, s, and `impacts` of each."""
+        """Steps, evaluations and rejected steps; under `joints` the `peak_normal`, N, `peak_time`, s, and `impacts` of each, and of
+        each of its two plays what has `worn` off, m, and the `worn_volume`, m^3."""
         self.impacts = impact_table(*results["impacts"])
         """One row per finished impact: the columns of `jointplay run --impacts`, with the names of the joints."""
 

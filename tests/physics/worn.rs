@@ -347,3 +347,32 @@ fn a_play_worn_wide_is_doubted() {
     let deep = doubts("1e-6 m^2/N");
     assert!(deep.contains("J: its play has worn") && deep.contains("a tenth of 10 mm"), "{deep}");
 }
+
+#[test]
+fn worn_depths_converge_with_the_square_of_the_step_or_with_damping_with_the_step() {
+    // The pin starts at rest and oscillates about its place on the receding wall. Damping feels the speed of the wall, which is that at the
+    // start of each step.
+    for (law, least_ratio, most) in [("hertz", 3.5, 2e-6), ("lankarani-nikravesh", 1.8, 1e-6)] {
+        let depth = |step: &str| worn(&run_by("rk4", PIN, &[("solver.step", step), ("contact.normal_law", law)], 5e-3));
+        let reference = depth("0.1 us");
+        let errors = ["8 us", "4 us", "2 us"].map(|step| (depth(step) / reference - 1.0).abs());
+        println!("{law}: {errors:?}");
+        assert!(errors[0] < most, "{law}: {errors:?}");
+        assert!(errors.windows(2).all(|pair| pair[0] > least_ratio * pair[1]), "{law}: {errors:?}");
+    }
+}
+
+#[test]
+fn a_restart_keeps_what_has_worn_off() {
+    let mut simulation = run_by("dopri5", PIN, &[], 0.01);
+    let (depth, vector) = (worn(&simulation), simulation.state_vector().to_vec());
+    simulation.restart_at(0.0, &vector).unwrap();
+    assert!(depth > 0.0);
+    assert_eq!(worn(&simulation), depth);
+    assert_eq!(simulation.state().plays(0)[0], 1e-4 + depth);
+    run_until(&mut simulation, 0.01);
+    assert!((worn(&simulation) / (2.0 * depth) - 1.0).abs() < 0.01);
+    // A reset makes the joint new.
+    simulation.reset().unwrap();
+    assert_eq!(worn(&simulation), 0.0);
+}

@@ -154,7 +154,7 @@ impl Scene {
             let message = conflict.fault.to_string();
             let keys = scene.keys_of(&conflict);
             let place = || {
-                let at = |key: &String| Some(places.get(key)?.error(&scene.conflict_text(&conflict, key)));
+                let at = |key: &String| Some(places.get(key)?.error(scene.conflict_text(&conflict, key)));
                 keys.iter().find_map(at)
             };
             // A default that does not fit the dimensions of a joint is not in the text; the joint is.
