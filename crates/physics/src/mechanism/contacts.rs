@@ -347,6 +347,9 @@ impl Contacts {
 
     /// Adds contact forces and updates gaps, if any contact may carry a force.
     pub(super) fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        if self.bristles > 0 {
+            self.straighten_bristles();
+        }
         if self.contacts.is_empty() || matches!(at.active_set, ActiveSet::Nothing) {
             return;
         }
@@ -358,6 +361,15 @@ impl Contacts {
             } else {
                 contact.load(at, loads);
             }
+        }
+    }
+
+    /// Sets the rates of all bristles to those without contact.
+    #[cold]
+    #[inline(never)]
+    fn straighten_bristles(&mut self) {
+        for state in self.contacts.iter_mut().filter_map(|contact| contact.bristles.as_mut()) {
+            state.rate = Vec3::zeros();
         }
     }
 

@@ -179,12 +179,9 @@ impl Stiff {
         let at = At { t, motion, active_set, bristles: &y[self.first_bristle..] };
         self.slips.clear();
         self.bristles.fill(Bristles::FREE);
-        let of_contacts = contacts.iter().map(|contact| (Some(contact), contact.coupling(&at)));
-        let of_elements = elements.iter().map(|element| (None, element.coupling(&at)));
-        for (contact, coupling) in of_contacts.chain(of_elements) {
-            let Some(coupling) = coupling else {
-                continue;
-            };
+        let of_contacts = contacts.iter().map(|contact| contact.coupling(&at));
+        let of_elements = elements.iter().map(|element| element.coupling(&at));
+        for coupling in of_contacts.chain(of_elements).flatten() {
             self.empty = false;
             let (sides, n) = (&coupling.sides, &coupling.normal);
             if let Some(torque_derivatives) = &coupling.torque_derivatives {
@@ -195,8 +192,10 @@ impl Stiff {
             }
             self.add(&coupling);
             self.record_coupled_trees();
-            if let Some(contact) = contact.filter(|contact| contact.bristles.is_some()) {
-                self.add_bristles(contact, &coupling, &at);
+        }
+        if !self.bristles.is_empty() {
+            for contact in contacts.iter().filter(|contact| contact.bristles.is_some()) {
+                self.gather_bristles(model, contact, equations, &at);
             }
         }
         self.coordinates.clear();
@@ -260,12 +259,14 @@ impl Stiff {
         }
     }
 
-    /// Adds the force of a contact's bristles, and records how the velocities bend them. Its columns are those in `columns`.
-    fn add_bristles(&mut self, contact: &Contact, coupling: &Coupling, at: &At<'_>) {
-        let (Some(state), Some(law), Some(force)) = (contact.bristles, contact.law.bristles, contact.bristle_force(at))
+    /// Adds the force of a contact's bristles, and records how the velocities bend them.
+    fn gather_bristles(&mut self, model: &Model, contact: &Contact, equations: &dyn Equations, at: &At<'_>) {
+        let (Some(state), Some(law), Some(force), Some(coupling)) =
+            (contact.bristles, contact.law.bristles, contact.bristle_force(at), contact.coupling(at))
         else {
             return;
         };
+        collect_columns(&mut self.columns, model, equations, &coupling.sides, &coupling.normal);
         let (first, n) = (self.slips.len(), &coupling.normal);
         self.slips.extend(self.columns.iter().map(|column| {
             let slip = if coupling.uses_surface_velocity { column.surface } else { column.centre };

@@ -92,7 +92,9 @@ impl System for Evaluator<'_> {
         self.load(t, y);
         let Mechanism { model, equations, contacts, gravity, latest, .. } = &mut *self.mechanism;
         let (moving, bristles) = dy.split_at_mut(y.len() - contacts.bristles());
-        contacts.bristle_rates(bristles);
+        if !bristles.is_empty() {
+            contacts.bristle_rates(bristles);
+        }
         let (dq, dv) = moving.split_at_mut(equations.positions(model));
         equations.position_rate(model, y, dq);
         equations.accelerate(model, gravity, t, y, dv);

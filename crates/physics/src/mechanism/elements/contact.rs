@@ -133,6 +133,7 @@ impl Contact {
     }
 
     /// Velocity of the surfaces against each other at the point of contact, m/s.
+    #[inline(always)]
     fn surface_velocity(&self, motion: &[Kinematics]) -> Vec3 {
         let Separation { normal, distance, .. } = &self.gap.separation;
         let levers = self.site.wall.levers(&self.law, *distance);
@@ -140,6 +141,7 @@ impl Contact {
     }
 
     /// Power dissipated by friction, W.
+    #[inline]
     fn friction_power(&self, motion: &[Kinematics]) -> f64 {
         let gap = &self.gap;
         if gap.friction == Vec3::zeros() {
@@ -222,9 +224,6 @@ impl Contact {
         let (e, velocity) = site.opening(at.motion, &arms);
         let gap = &mut self.gap;
         *gap = Gap { eccentricity: e, eccentricity_rate: velocity, ..Gap::default() };
-        if let Some(bristles) = &mut self.bristles {
-            bristles.rate = Vec3::zeros();
-        }
         let clearance = law.clearance;
         let rotation = &at.motion[site.carrier.body].rotation;
         if !wall.is_beyond(&e, clearance, rotation) {
@@ -297,8 +296,8 @@ impl ForceElement for Contact {
             law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force, &confined);
         let distance = gap.separation.distance;
         let levers = site.wall.levers(law, distance);
-        if let Some(force) = self.bristle_force(at)
-            && let Some(law) = &law.bristles
+        if let Some(law) = &law.bristles
+            && let Some(force) = self.bristle_force(at)
         {
             stiffness.add_bristles(&n, law, &force);
         }
