@@ -1,6 +1,7 @@
 //! The microscope: magnifies one joint with play beside the 3D view until its play is visible.
 
 mod draw;
+mod friction;
 mod magnified_joint;
 mod pin;
 mod slide;
@@ -17,6 +18,7 @@ use crate::machine::LooseKind;
 use crate::simulate::ContactMode;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
+pub use friction::{FrictionCurve, FrictionScale};
 use magnified_joint::MagnifiedJoint;
 
 /// Least width and height, points.
@@ -33,6 +35,8 @@ const MIN_REMAINDER: f32 = 120.0;
 /// Height of the section of the contact, and least height in a low panel, points.
 const SECTION_HEIGHT: f32 = 112.0;
 const MIN_SECTION_HEIGHT: f32 = 76.0;
+/// Height of the panel from which it has the diagram of friction, points.
+const MIN_HEIGHT_WITH_FRICTION: f32 = 260.0;
 /// Width from which pictures and numbers are side by side, points.
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 430.0;
 /// Least side of a phone's picture with the choice of the plane in sight below it, points.
@@ -49,6 +53,7 @@ pub struct Microscope {
     joint: usize,
     plane: Plane,
     circle: Option<Circle>,
+    friction: Option<(FrictionCurve, FrictionScale)>,
 }
 
 impl Microscope {
@@ -77,10 +82,16 @@ impl Microscope {
         self.circle
     }
 
+    /// Friction over sliding, as last drawn; `None` if it was not.
+    pub fn friction(&self) -> Option<&(FrictionCurve, FrictionScale)> {
+        self.friction.as_ref()
+    }
+
     /// The panel, beside the picture or below it in a tall `ui`; `view`: world vectors to the right and up in the 3D view.
     /// Returns the joint selected in it.
     fn ui(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
         self.circle = None;
+        self.friction = None;
         let room = ui.available_size();
         let (room, least, panel) = if room.x > room.y {
             (room.x, MIN_SIZE.x, Panel::right("microscope"))
@@ -133,6 +144,7 @@ impl Microscope {
         };
         let space = ui.available_size();
         let axes = self.plane.axes(player.running().view.down, view);
+        let has_friction = self.has_friction(player, space.y);
         if space.x >= MIN_WIDTH_SIDE_BY_SIDE && space.x > space.y {
             ui.horizontal_top(|ui| {
                 let side = (space.x - NUMBERS_WIDTH - 8.0).min(space.y).max(96.0);
@@ -142,6 +154,9 @@ impl Microscope {
                         if magnified.has_section() {
                             section(ui, &magnified, SECTION_HEIGHT);
                         }
+                        if has_friction {
+                            self.friction = friction::diagram(ui, player, &magnified, self.joint);
+                        }
                         numbers(ui, player, &magnified, axes);
                     });
                 });
@@ -149,21 +164,26 @@ impl Microscope {
         } else {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
+                let gap = ui.spacing().item_spacing.y;
+                let below = if has_friction { friction::HEIGHT + gap } else { 0.0 };
                 let side = if is_narrow {
                     // The choice below is shown whole or is scrolled to: a strip of it would look like a mistake.
-                    let choice = ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
+                    let choice = ui.spacing().interact_size.y + gap;
                     let above = space.y - choice;
                     if above >= MIN_SIDE_ABOVE_CHOICE { width.min(above) } else { space.y }
                 } else {
-                    draw::side(vec2(width, space.y), 150.0)
+                    draw::side(vec2(width, space.y), (MIN_SECTION_HEIGHT + gap + below).max(150.0))
                 };
                 self.picture(ui, player, &magnified, axes, vec2(width, side));
                 if is_narrow {
                     self.plane_choice(ui);
                 }
-                let left = space.y - side - ui.spacing().item_spacing.y;
+                let left = space.y - side - gap - below;
                 if magnified.has_section() {
                     section(ui, &magnified, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
+                }
+                if has_friction {
+                    self.friction = friction::diagram(ui, player, &magnified, self.joint);
                 }
                 numbers(ui, player, &magnified, axes);
             });
@@ -175,6 +195,12 @@ impl Microscope {
         let help = "Plane of the picture, seen along its normal: as the 3D view, or that of two world axes";
         let names = ["Plane of the microscope", help];
         layout::choice(ui, names, Some(54.0), &mut self.plane, Plane::ALL, Plane::label);
+    }
+
+    /// Whether the diagram of friction is shown in a panel `height` points high: not in a low one, and not without friction.
+    fn has_friction(&self, player: &Player, height: f32) -> bool {
+        let joint = player.running().machine.loose_joints.get(self.joint);
+        height >= MIN_HEIGHT_WITH_FRICTION && joint.is_some_and(|joint| friction::is_shown(&joint.contact))
     }
 
     /// The picture of the play.
