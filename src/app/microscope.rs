@@ -18,7 +18,7 @@ use crate::machine::LooseKind;
 use crate::simulate::ContactMode;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
-pub use friction::{FrictionCurve, FrictionScale};
+pub use friction::{CurvePoint, FrictionCurve, FrictionScale};
 use magnified_joint::MagnifiedJoint;
 
 /// Least width and height, points.
@@ -36,7 +36,7 @@ const MIN_REMAINDER: f32 = 120.0;
 const SECTION_HEIGHT: f32 = 112.0;
 const MIN_SECTION_HEIGHT: f32 = 76.0;
 /// Height of the panel from which it has the diagram of friction, points.
-const MIN_HEIGHT_WITH_FRICTION: f32 = 260.0;
+const MIN_HEIGHT_WITH_FRICTION: f32 = 180.0;
 /// Width from which pictures and numbers are side by side, points.
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 430.0;
 /// Least side of a phone's picture with the choice of the plane in sight below it, points.
@@ -155,7 +155,7 @@ impl Microscope {
                             section(ui, &magnified, SECTION_HEIGHT);
                         }
                         if has_friction {
-                            self.friction = friction::diagram(ui, player, &magnified, self.joint);
+                            self.friction = friction::diagram(ui, player, &magnified, (self.joint, friction::HEIGHT));
                         }
                         numbers(ui, player, &magnified, axes);
                     });
@@ -165,7 +165,7 @@ impl Microscope {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
                 let gap = ui.spacing().item_spacing.y;
-                let below = if has_friction { friction::HEIGHT + gap } else { 0.0 };
+                let below = if has_friction { friction::MIN_HEIGHT + gap } else { 0.0 };
                 let side = if is_narrow {
                     // The choice below is shown whole or is scrolled to: a strip of it would look like a mistake.
                     let choice = ui.spacing().interact_size.y + gap;
@@ -178,12 +178,15 @@ impl Microscope {
                 if is_narrow {
                     self.plane_choice(ui);
                 }
-                let left = space.y - side - gap - below;
+                let mut left = space.y - side - gap;
                 if magnified.has_section() {
-                    section(ui, &magnified, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
+                    let height = (left - below).clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT);
+                    section(ui, &magnified, height);
+                    left -= height + gap;
                 }
                 if has_friction {
-                    self.friction = friction::diagram(ui, player, &magnified, self.joint);
+                    let height = left.clamp(friction::MIN_HEIGHT, friction::HEIGHT);
+                    self.friction = friction::diagram(ui, player, &magnified, (self.joint, height));
                 }
                 numbers(ui, player, &magnified, axes);
             });

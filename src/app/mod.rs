@@ -112,7 +112,7 @@ use lesson::Course;
 pub use lesson::{BUILT_IN_LESSONS, Lesson, RunningLesson, lesson_titles};
 pub use log::{Entry, Event, Log};
 use messages::Messages;
-pub use microscope::{Circle, FrictionCurve, FrictionScale, Microscope};
+pub use microscope::{Circle, CurvePoint, FrictionCurve, FrictionScale, Microscope};
 pub use options::AppOptions;
 pub use overlay::{Overlay, Room, Strips, force_notes, strips, triad};
 use panels::{Panels, Sheet};

@@ -3,7 +3,7 @@
 use super::paths::axes_of;
 use crate::machine::{LooseJoint, Vec3};
 use crate::scene::Scene;
-use crate::simulate::{Frame, RECORDED_JOINTS, Sliding};
+use crate::simulate::{Frame, RECORDED_JOINTS};
 
 /// Points stored per joint, for all its places together.
 const MAX_POINTS: usize = 4096;
@@ -11,49 +11,89 @@ const MAX_POINTS: usize = 4096;
 const FORCE_RESOLUTION: f64 = 0.01;
 const DISPLACEMENT_RESOLUTION: f64 = 0.005;
 
-/// A contact at one instant. Vectors are in the axes of the carrier's body.
+/// A contact at one instant. The components are along two directions across the normal, fixed in the carrier's body on a plane wall; on a
+/// curved wall they turn with the normal as little as possible, so that a displacement is a way along the wall.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
     /// Time, s.
     pub time: f64,
-    /// Path of the carried part's surface over the carrier's since the contact began, m; in a contact under way when the record began,
+    /// Way of the carried part's surface over the carrier's since the contact began, m; in a contact under way when the record began,
     /// since then.
-    pub displacement: Vec3,
+    pub displacement: [f64; 2],
     /// Friction force on the carried part, N.
-    pub friction: Vec3,
-    /// Sliding velocity, m/s, and limit of friction, N.
-    pub sliding: Sliding,
-    /// Whether the surfaces touch. The first point at which they no longer do ends the contact, and is zero.
-    touches: bool,
+    pub friction: [f64; 2],
+    /// Sliding velocity, m/s.
+    pub velocity: [f64; 2],
+    /// Limit of friction, N.
+    pub limit: f64,
+    /// The normal, and the first of the two directions, in the axes of the carrier's body.
+    normal: Vec3,
+    direction: Vec3,
+    /// Whether the surfaces press. The first point at which they no longer do ends the contact, and is zero.
+    presses: bool,
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// A direction across the unit vector `normal`: near a coordinate axis.
+fn across(normal: &Vec3) -> Vec3 {
+    let axis = Vec3::ith(normal.abs().imin(), 1.0);
+    (axis - normal * normal.dot(&axis)).normalize()
 }
 
 impl Point {
     /// Place `place` of joint `joint` in `frame`, after `before`.
     fn of(frame: &Frame, (joint, place): (usize, usize), carrier: Option<usize>, before: Option<&Self>) -> Self {
         let report = &frame.joints[joint];
-        let (depth, friction, sliding) = match frame.sites_of(joint).get(place) {
-            Some(site) => (-site.gap, site.friction_force, site.sliding),
-            None => (report.penetration, report.friction_force, report.sliding),
+        let (depth, force, friction, sliding) = match frame.sites_of(joint).get(place) {
+            Some(site) => (-site.gap, site.normal_force, site.friction_force, site.sliding),
+            None => (report.penetration, report.normal_force, report.friction_force, report.sliding),
         };
-        if depth <= 0.0 || depth.is_nan() {
-            return Self { time: frame.time, ..Self::default() };
-        }
+        let before = before.filter(|before| before.presses);
         let axes = axes_of(frame, carrier);
-        let velocity = axes.tr_mul(&sliding.velocity);
-        let displacement = before.filter(|before| before.touches).map_or_else(Vec3::zeros, |before| {
-            before.displacement + (before.sliding.velocity + velocity) * (0.5 * (frame.time - before.time))
+        let normal = axes.tr_mul(&force).try_normalize(0.0).or(before.map(|before| before.normal));
+        let Some(normal) = normal.filter(|_| depth > 0.0) else {
+            return Self { time: frame.time, ..Self::default() };
+        };
+        let direction = before.map_or_else(
+            || across(&normal),
+            |Self { normal: old, direction, .. }| {
+                // By the smallest rotation from the old normal to the new one.
+                let both = old + normal;
+                let turned = direction - both * (both.dot(direction) / (1.0 + old.dot(&normal)));
+                (turned - normal * normal.dot(&turned)).try_normalize(0.0).unwrap_or_else(|| across(&normal))
+            },
+        );
+        let second = normal.cross(&direction);
+        let components = |vector: &Vec3| {
+            let own = axes.tr_mul(vector);
+            [direction.dot(&own), second.dot(&own)]
+        };
+        let velocity = components(&sliding.velocity);
+        let displacement = before.map_or([0.0; 2], |before| {
+            let half = 0.5 * (frame.time - before.time);
+            [0, 1].map(|i| before.displacement[i] + half * (before.velocity[i] + velocity[i]))
         });
-        let sliding = Sliding { velocity, ..sliding };
-        Self { time: frame.time, displacement, friction: axes.tr_mul(&friction), sliding, touches: true }
+        Self {
+            time: frame.time,
+            displacement,
+            friction: components(&friction),
+            velocity,
+            limit: sliding.limit,
+            normal,
+            direction,
+            presses: true,
+        }
     }
 
     /// Whether a curve can leave `self` out beside `other`; `extent` is the largest displacement of the contact, m.
     fn is_close_to(&self, other: &Self, extent: f64) -> bool {
-        let limit = FORCE_RESOLUTION * self.sliding.limit.max(other.sliding.limit);
-        self.touches == other.touches
-            && (self.friction - other.friction).norm() <= limit
-            && (self.sliding.limit - other.sliding.limit).abs() <= limit
-            && (self.displacement - other.displacement).norm() <= DISPLACEMENT_RESOLUTION * extent
+        let limit = FORCE_RESOLUTION * self.limit.max(other.limit);
+        distance(self.friction, other.friction) <= limit
+            && (self.limit - other.limit).abs() <= limit
+            && distance(self.displacement, other.displacement) <= DISPLACEMENT_RESOLUTION * extent
     }
 }
 
@@ -113,18 +153,18 @@ impl FrictionRecord {
                     continue;
                 }
                 let point = Point::of(frame, (joint, place), own.carrier, last);
-                let has_begun = !last.is_some_and(|last| last.touches);
+                let has_begun = !last.is_some_and(|last| last.presses);
                 if has_begun {
-                    if !point.touches {
+                    if !point.presses {
                         continue;
                     }
                     *extent = 0.0;
                 }
-                *extent = extent.max(point.displacement.norm());
+                *extent = extent.max(distance(point.displacement, [0.0; 2]));
                 // The latest instant is always there: the next one replaces it if a curve does not need it.
                 if let [.., before, last] = &mut points[..]
-                    && before.touches
-                    && point.touches
+                    && before.presses
+                    && point.presses
                     && last.is_close_to(before, *extent)
                 {
                     *last = point;
@@ -144,13 +184,15 @@ impl FrictionRecord {
     pub fn contact(&self, joint: usize, frame: &Frame) -> Option<Contact<'_>> {
         let own = self.joints.get(joint).filter(|_| joint < frame.joints.len())?;
         let contacts = own.places.iter().enumerate().filter_map(|(place, record)| {
-            let known = &record.points[..record.points.partition_point(|point| point.time <= frame.time)];
-            let now = Point::of(frame, (joint, place), own.carrier, known.last());
-            let end = known.iter().rposition(|point| point.touches).map_or(0, |last| last + 1);
-            let is_another = now.touches && end < known.len();
-            let start = known[..end].iter().rposition(|point| !point.touches).map_or(0, |before| before + 1);
+            let known = &record.points[..record.points.partition_point(|point| point.time < frame.time)];
+            let recorded = record.points.get(known.len()).filter(|point| point.time == frame.time);
+            let of_frame = || Point::of(frame, (joint, place), own.carrier, known.last());
+            let now = recorded.copied().unwrap_or_else(of_frame);
+            let end = known.iter().rposition(|point| point.presses).map_or(0, |last| last + 1);
+            let is_another = now.presses && end < known.len();
+            let start = known[..end].iter().rposition(|point| !point.presses).map_or(0, |before| before + 1);
             let points = if is_another { &[] } else { &known[start..end] };
-            let contact = Contact { place, points, now: Some(now).filter(|now| now.touches) };
+            let contact = Contact { place, points, now: Some(now).filter(|now| now.presses) };
             (contact.now.is_some() || !points.is_empty()).then_some(contact)
         });
         // A contact under way before one that has ended; then the earlier start, or the later end.
@@ -169,7 +211,7 @@ impl FrictionRecord {
 mod tests {
     use super::*;
     use crate::session::player::Player;
-    use crate::simulate::Simulation;
+    use crate::simulate::{Simulation, Sliding};
 
     /// A block of 1 kg that lies in its guide and is pushed to and fro beyond the limit of friction.
     fn pushed_block(amplitude: f64, changes: &[(&str, &str)]) -> Scene {
@@ -238,27 +280,25 @@ mod tests {
                     Some(site) => (-site.gap, site.friction_force, site.normal_force, site.sliding.velocity),
                     None => (report.penetration, report.friction_force, report.normal_force, report.sliding.velocity),
                 };
-                assert_eq!(point.touches, depth > 0.0);
-                if !point.touches {
+                if !point.presses {
+                    assert!(depth <= 0.0);
                     assert_eq!(point, Point { time: point.time, ..Point::default() });
                     continue;
                 }
-                let axes = axes_of(&frame, scene.machine.loose_joints[joint].carrier().body);
                 // The static coefficient is the kinetic one.
                 let limit = scene.machine.loose_joints[joint].contact.friction * normal.norm();
+                assert!((point.limit - limit).abs() <= 1e-12 * limit, "{law}: {point:?}, not {limit}");
+                // Components across the normal, in whatever directions.
+                let [of_force, of_velocity] = [point.friction, point.velocity].map(|[x, y]| Vec3::new(x, y, 0.0));
+                let [size, speed] = [force.norm(), velocity.norm()];
+                assert!((of_force.norm() - size).abs() <= 1e-6 * size, "{law}: {point:?}, not {force}");
+                // Where the normal force is clipped to zero, its direction is not known.
                 assert!(
-                    (axes * point.friction - force).norm() <= 1e-12 * limit,
-                    "{law} at {} s: {} {force}",
-                    point.time,
-                    axes * point.friction
+                    limit == 0.0 || (of_velocity.norm() - speed).abs() <= 1e-6 * speed,
+                    "{law}: {point:?}, not {velocity}"
                 );
-                assert!(
-                    (point.sliding.limit - limit).abs() <= 1e-12 * limit,
-                    "{law} at {} s: {} {limit}",
-                    point.time,
-                    point.sliding.limit
-                );
-                assert!((axes * point.sliding.velocity - velocity).norm() <= 1e-12 * velocity.norm());
+                let off = of_force.dot(&of_velocity) - force.dot(&velocity);
+                assert!(off.abs() <= 1e-6 * size * speed, "{law}: {point:?}");
                 assert!(force.norm() <= limit * (1.0 + 1e-9), "{law} at {} s", point.time);
                 compared += 1;
             }
@@ -275,7 +315,7 @@ mod tests {
             let mut other = Simulation::new(&scene.machine).expect("starts");
             let mut frame = Frame::default();
             let recorded = points(&player, 0);
-            let begun = recorded.iter().rposition(|point| !point.touches).map_or(0, |before| before + 1);
+            let begun = recorded.iter().rposition(|point| !point.presses).map_or(0, |before| before + 1);
             assert!(recorded.len() - begun > 200, "{law}: it lies");
             let (mut first, mut way) = (None, 0.0_f64);
             for point in &recorded[begun..] {
@@ -283,11 +323,11 @@ mod tests {
                     other.step().expect("runs");
                 }
                 other.sample(point.time, &mut frame);
-                let own = frame.joints[0].axial - point.displacement.x;
+                let own = frame.joints[0].axial - point.displacement[0];
                 let first = *first.get_or_insert(own);
                 // The corner moves with the block, which turns by some 1e-8.
                 assert!((own - first).abs() < 2e-8, "{law}: {:e} m at {} s", own - first, point.time);
-                way = way.max(point.displacement.x.abs());
+                way = way.max(point.displacement[0].abs());
             }
             assert!(way > 5e-6, "{law}: {way:e} m");
         }
@@ -304,11 +344,11 @@ mod tests {
         let area: f64 = period
             .windows(2)
             .map(|pair| {
-                -0.5 * (pair[0].friction + pair[1].friction).dot(&(pair[1].displacement - pair[0].displacement))
+                -0.5 * (pair[0].friction[0] + pair[1].friction[0]) * (pair[1].displacement[0] - pair[0].displacement[0])
             })
             .sum();
         let [least, most] =
-            [f64::min, f64::max].map(|of| period.iter().map(|point| point.displacement.x).reduce(of).expect("points"));
+            [f64::min, f64::max].map(|of| period.iter().map(|point| point.displacement[0]).reduce(of).expect("points"));
         let force = 0.15 * 0.5 * 9.81;
         let expected = 4.0 * (0.5 * (most - least) - force / 1e8) * force;
         assert!(expected > 0.0 && (area / expected - 1.0).abs() < 0.03, "{area:e} J, not {expected:e} J");
@@ -332,24 +372,31 @@ mod tests {
         let at = |time: f64| after.iter().find(|point| point.time == time);
         let both: Vec<(&Point, &Point)> = before.iter().filter_map(|own| Some((own, at(own.time)?))).collect();
         assert!(both.len() > before.len() / 2, "{} of {}", both.len(), before.len());
-        let way = before.iter().map(|point| point.displacement.norm()).fold(0.0, f64::max);
+        let way = before.iter().map(|point| distance(point.displacement, [0.0; 2])).fold(0.0, f64::max);
         for (own, again) in both {
-            assert_eq!((own.friction, own.sliding), (again.friction, again.sliding));
-            assert!((own.displacement - again.displacement).norm() < 1e-3 * way, "{own:?} {again:?}");
+            assert_eq!(own.limit, again.limit);
+            assert!(distance(own.friction, again.friction) <= 1e-6 * own.limit, "{own:?} {again:?}");
+            assert!(distance(own.displacement, again.displacement) < 1e-3 * way, "{own:?} {again:?}");
         }
 
         let mut record = FrictionRecord::new(&scene);
         let mut frame = player.frame().clone();
         for step in 0..20_000 {
             frame.time = f64::from(step) * 1e-5;
+            // The wall turns under the surface, which slides along it.
+            let (sine, cosine) = (1e-3 * f64::from(step)).sin_cos();
             frame.joints[0].penetration = 1e-6;
-            frame.joints[0].sliding = Sliding { velocity: Vec3::x(), limit: 10.0 };
-            frame.joints[0].friction_force.x = f64::from(step % 7);
+            frame.joints[0].normal_force = Vec3::new(cosine, sine, 0.0);
+            frame.joints[0].sliding = Sliding { velocity: Vec3::new(-sine, cosine, 0.0), limit: 10.0 };
+            frame.joints[0].friction_force = frame.joints[0].sliding.velocity * f64::from(step % 7);
             record.record(&frame);
             assert!(record.joints[0].places[0].points.len() <= MAX_POINTS);
         }
         let last = record.joints[0].places[0].points.last().expect("points");
-        assert!((last.displacement - Vec3::x() * (frame.time - 0.0)).norm() < 1e-9, "since the contact began");
+        let axes = axes_of(&frame, scene.machine.loose_joints[0].carrier().body);
+        assert_eq!(axes, crate::machine::Mat3::identity(), "a socket of the world");
+        let way = distance(last.displacement, [0.0; 2]);
+        assert!((way - frame.time).abs() < 1e-9, "{way} m along the wall since the contact began");
     }
 
     #[test]
@@ -364,7 +411,7 @@ mod tests {
         for (step, (gaps, expected)) in gaps.into_iter().zip(expected).enumerate() {
             frame.time = step as f64;
             for (site, gap) in frame.sites.iter_mut().zip(gaps.into_iter().chain([1.0; 2])) {
-                site.gap = gap;
+                (site.gap, site.normal_force) = (gap, Vec3::y());
             }
             record.record(&frame);
             let found = record.contact(0, &frame).map(|contact| (contact.place, contact.now.is_some()));

@@ -9,10 +9,10 @@ use crate::app::overlay::colour;
 use crate::app::player::Player;
 use crate::app::value;
 use crate::contact::{FrictionLaw, Parameters};
-use crate::machine::{Mat3, Vec3};
 
-/// Height, points.
-pub const HEIGHT: f32 = 128.0;
+/// Height where there is room, and least height, points.
+pub const HEIGHT: f32 = 140.0;
+pub const MIN_HEIGHT: f32 = 110.0;
 /// Margins of the curves beside the labels: left, top, right, bottom, points.
 const MARGINS: [f32; 4] = [52.0, 22.0, 12.0, 20.0];
 /// Space around the curves, as a fraction of their range.
@@ -75,19 +75,17 @@ pub fn is_shown(contact: &Parameters) -> bool {
 }
 
 /// Main direction in which the surfaces slide.
-fn main_direction(points: &[Point]) -> Vec3 {
-    let mut spread = Mat3::zeros();
-    for pair in points.windows(2) {
-        let way = pair[1].displacement - pair[0].displacement;
-        let length = way.norm();
-        if length > 0.0 {
-            spread += way * way.transpose() / length;
-        }
-    }
-    let found = spread.symmetric_eigen();
-    let direction = found.eigenvectors.column(found.eigenvalues.imax()).into_owned();
-    // The curve must not turn about when the direction changes a little.
-    if direction.dot(&Vec3::new(1.0, 0.5, 0.25)) < 0.0 { -direction } else { direction }
+fn main_direction(points: &[Point]) -> [f64; 2] {
+    let ways = points.windows(2).map(|pair| [0, 1].map(|i| pair[1].displacement[i] - pair[0].displacement[i]));
+    // Twice the angle of each way, so that to and fro are one direction.
+    let [x, y] = ways.fold([0.0; 2], |[x, y], [a, b]| {
+        let length = a.hypot(b).max(f64::MIN_POSITIVE);
+        [x + (a * a - b * b) / length, y + 2.0 * a * b / length]
+    });
+    let angle = 0.5 * y.atan2(x);
+    let along = [angle.cos(), angle.sin()];
+    // The curve must not turn about when a direction near an axis changes a little.
+    if along[0] + 0.5 * along[1] < 0.0 { along.map(|x| -x) } else { along }
 }
 
 impl FrictionCurve {
@@ -99,11 +97,12 @@ impl FrictionCurve {
         let first = points.partition_point(|point| point.time < end - player.automatic_window());
         let shown: Vec<Point> = points[first..].iter().copied().chain(now).collect();
         let along = main_direction(&shown);
+        let component = |vector: [f64; 2]| along[0] * vector[0] + along[1] * vector[1];
         let points = shown.iter().map(|point| CurvePoint {
             time: point.time,
-            displacement: along.dot(&point.displacement),
-            friction: -along.dot(&point.friction),
-            limit: point.sliding.limit,
+            displacement: component(point.displacement),
+            friction: -component(point.friction),
+            limit: point.limit,
         });
         Some(Self { place, touches: now.is_some(), points: points.collect() })
     }
@@ -125,14 +124,14 @@ impl FrictionCurve {
     }
 }
 
-/// The diagram at the cursor of `ui`, with the scale to which it was drawn; an empty one before the first contact.
+/// The diagram of joint `joint` at the cursor of `ui`, `height` points high, with its scale; an empty one before the first contact.
 pub fn diagram(
     ui: &mut Ui,
     player: &Player,
     magnified: &MagnifiedJoint,
-    joint: usize,
+    (joint, height): (usize, f32),
 ) -> Option<(FrictionCurve, FrictionScale)> {
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
     let Some(curve) = FrictionCurve::of(player, joint) else {
         draw::empty(ui, rect, "No contact, no friction so far");
         return None;
@@ -172,7 +171,7 @@ pub fn diagram(
     let [part, wall] = magnified.kind.parts();
     let help = format!(
         "Friction force of the {part} on the {wall} over the displacement of their surfaces since the contact began, both along the main \
-         direction of sliding; the last {} of the contact at most. The orange lines are the limit of friction, + and - μ N. The area of a \
+         direction of sliding on the wall; the last {} of the contact at most. The orange lines are the limit of friction, + and - μ N. The area of a \
          closed loop is the energy that friction takes. Bristles bend before they slide, and friction rises and falls along a \
          slope; the modified Coulomb law depends on the sliding speed alone, and friction jumps where the sliding reverses.",
         value::time(player.automatic_window())
