@@ -1,9 +1,9 @@
 //! The recent friction at the contacts of joints with play, over the displacement of the surfaces: drawn by the microscope.
 
 use super::paths::axes_of;
-use crate::machine::{LooseJoint, Vec3};
+use crate::machine::{LooseJoint, Mat3, Vec3};
 use crate::scene::Scene;
-use crate::simulate::{Frame, RECORDED_JOINTS};
+use crate::simulate::{Frame, JointReport, RECORDED_JOINTS, SiteReport};
 
 /// Points stored per joint, for all its places together.
 const MAX_POINTS: usize = 4096;
@@ -33,8 +33,9 @@ pub struct Point {
     presses: bool,
 }
 
+/// The larger of the two differences of the components.
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    (a[0] - b[0]).abs().max((a[1] - b[1]).abs())
 }
 
 /// A direction across the unit vector `normal`: near a coordinate axis.
@@ -44,18 +45,20 @@ fn across(normal: &Vec3) -> Vec3 {
 }
 
 impl Point {
-    /// Place `place` of joint `joint` in `frame`, after `before`.
-    fn of(frame: &Frame, (joint, place): (usize, usize), carrier: Option<usize>, before: Option<&Self>) -> Self {
-        let report = &frame.joints[joint];
-        let (depth, force, friction, sliding) = match frame.sites_of(joint).get(place) {
-            Some(site) => (-site.gap, site.normal_force, site.friction_force, site.sliding),
-            None => (report.penetration, report.normal_force, report.friction_force, report.sliding),
+    /// A joint at `time`, s, or one of its places, with the axes of its carrier's body as columns, after `before`.
+    fn of(time: f64, (report, site): (&JointReport, Option<&SiteReport>), axes: &Mat3, before: Option<&Self>) -> Self {
+        let (depth, force, friction, sliding) = match site {
+            Some(site) => (-site.gap, &site.normal_force, &site.friction_force, &site.sliding),
+            None => (report.penetration, &report.normal_force, &report.friction_force, &report.sliding),
         };
+        let nothing = Self { time, ..Self::default() };
+        if depth <= 0.0 {
+            return nothing;
+        }
         let before = before.filter(|before| before.presses);
-        let axes = axes_of(frame, carrier);
-        let normal = axes.tr_mul(&force).try_normalize(0.0).or(before.map(|before| before.normal));
-        let Some(normal) = normal.filter(|_| depth > 0.0) else {
-            return Self { time: frame.time, ..Self::default() };
+        let normal = axes.tr_mul(force).try_normalize(0.0).or(before.map(|before| before.normal));
+        let Some(normal) = normal else {
+            return nothing;
         };
         let direction = before.map_or_else(
             || across(&normal),
@@ -73,13 +76,13 @@ impl Point {
         };
         let velocity = components(&sliding.velocity);
         let displacement = before.map_or([0.0; 2], |before| {
-            let half = 0.5 * (frame.time - before.time);
+            let half = 0.5 * (time - before.time);
             [0, 1].map(|i| before.displacement[i] + half * (before.velocity[i] + velocity[i]))
         });
         Self {
-            time: frame.time,
+            time,
             displacement,
-            friction: components(&friction),
+            friction: components(friction),
             velocity,
             limit: sliding.limit,
             normal,
@@ -143,6 +146,8 @@ impl FrictionRecord {
     pub fn record(&mut self, frame: &Frame) {
         for (joint, own) in self.joints.iter_mut().enumerate().take(frame.joints.len()) {
             let most = MAX_POINTS / own.places.len();
+            let (report, sites) = (&frame.joints[joint], frame.sites_of(joint));
+            let axes = axes_of(frame, own.carrier);
             for (place, record) in own.places.iter_mut().enumerate() {
                 let PlaceRecord { points, extent } = record;
                 while points.last().is_some_and(|last| last.time > frame.time) {
@@ -152,7 +157,7 @@ impl FrictionRecord {
                 if last.is_some_and(|last| last.time == frame.time) {
                     continue;
                 }
-                let point = Point::of(frame, (joint, place), own.carrier, last);
+                let point = Point::of(frame.time, (report, sites.get(place)), &axes, last);
                 let has_begun = !last.is_some_and(|last| last.presses);
                 if has_begun {
                     if !point.presses {
@@ -183,10 +188,12 @@ impl FrictionRecord {
     /// known.
     pub fn contact(&self, joint: usize, frame: &Frame) -> Option<Contact<'_>> {
         let own = self.joints.get(joint).filter(|_| joint < frame.joints.len())?;
+        let (report, sites) = (&frame.joints[joint], frame.sites_of(joint));
+        let axes = axes_of(frame, own.carrier);
         let contacts = own.places.iter().enumerate().filter_map(|(place, record)| {
             let known = &record.points[..record.points.partition_point(|point| point.time < frame.time)];
             let recorded = record.points.get(known.len()).filter(|point| point.time == frame.time);
-            let of_frame = || Point::of(frame, (joint, place), own.carrier, known.last());
+            let of_frame = || Point::of(frame.time, (report, sites.get(place)), &axes, known.last());
             let now = recorded.copied().unwrap_or_else(of_frame);
             let end = known.iter().rposition(|point| point.presses).map_or(0, |last| last + 1);
             let is_another = now.presses && end < known.len();
