@@ -6,7 +6,7 @@ mod magnified_joint;
 mod pin;
 mod slide;
 
-use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, TextStyle, Ui, WidgetInfo, vec2};
 use glam::Vec3;
 
 use super::keys::Action;
@@ -151,13 +151,12 @@ impl Microscope {
                 self.picture(ui, player, &magnified, axes, vec2(side, side));
                 ui.vertical(|ui| {
                     scrolled(ui, |ui| {
+                        let mut left = space.y;
                         if magnified.has_section() {
                             section(ui, &magnified, SECTION_HEIGHT);
+                            left -= SECTION_HEIGHT + ui.spacing().item_spacing.y;
                         }
-                        if has_friction {
-                            self.friction = friction::diagram(ui, player, &magnified, (self.joint, friction::HEIGHT));
-                        }
-                        numbers(ui, player, &magnified, axes);
+                        self.below_pictures(ui, player, &magnified, (axes, has_friction.then_some(left)));
                     });
                 });
             });
@@ -165,14 +164,19 @@ impl Microscope {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
                 let gap = ui.spacing().item_spacing.y;
-                let below = if has_friction { friction::MIN_HEIGHT + gap } else { 0.0 };
+                // The state of the contact stays in sight, then the diagram of friction if the circle leaves it room.
+                let state = ui.text_style_height(&TextStyle::Body) + gap;
+                let section_height = if magnified.has_section() { MIN_SECTION_HEIGHT + gap } else { 0.0 };
+                let below = section_height + state + friction::MIN_HEIGHT + 2.0 * gap;
+                let reserves = has_friction && below <= MAX_FRACTION * space.y;
                 let side = if is_narrow {
                     // The choice below is shown whole or is scrolled to: a strip of it would look like a mistake.
                     let choice = ui.spacing().interact_size.y + gap;
                     let above = space.y - choice;
                     if above >= MIN_SIDE_ABOVE_CHOICE { width.min(above) } else { space.y }
                 } else {
-                    draw::side(vec2(width, space.y), (MIN_SECTION_HEIGHT + gap + below).max(150.0))
+                    let largest = draw::side(vec2(width, space.y), 150.0);
+                    if reserves { largest.min(space.y - below) } else { largest }
                 };
                 self.picture(ui, player, &magnified, axes, vec2(width, side));
                 if is_narrow {
@@ -180,18 +184,37 @@ impl Microscope {
                 }
                 let mut left = space.y - side - gap;
                 if magnified.has_section() {
-                    let height = (left - below).clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT);
+                    let most = if reserves { left - (below - section_height) } else { left };
+                    let height = most.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT);
                     section(ui, &magnified, height);
                     left -= height + gap;
                 }
-                if has_friction {
-                    let height = left.clamp(friction::MIN_HEIGHT, friction::HEIGHT);
-                    self.friction = friction::diagram(ui, player, &magnified, (self.joint, height));
-                }
-                numbers(ui, player, &magnified, axes);
+                self.below_pictures(ui, player, &magnified, (axes, has_friction.then_some(left)));
             });
         }
         chosen
+    }
+
+    /// What is below the pictures, with the diagram of friction in `room`, points, if there is one: above the numbers if it fits there.
+    fn below_pictures(
+        &mut self,
+        ui: &mut Ui,
+        player: &Player,
+        magnified: &MagnifiedJoint,
+        (axes, room): ([Vec3; 2], Option<f32>),
+    ) {
+        let top = ui.cursor().top();
+        ui.label(RichText::new(value::contact(magnified.report.state, magnified.kind.parts()[0])).strong());
+        let room = room.map(|room| room - (ui.cursor().top() - top));
+        let fits = room.is_some_and(|room| room >= friction::MIN_HEIGHT);
+        let height = room.map(|room| room.clamp(friction::MIN_HEIGHT, friction::HEIGHT));
+        if let Some(height) = height.filter(|_| fits) {
+            self.friction = friction::diagram(ui, player, magnified, (self.joint, height));
+        }
+        numbers(ui, player, magnified, axes);
+        if let Some(height) = height.filter(|_| !fits) {
+            self.friction = friction::diagram(ui, player, magnified, (self.joint, height));
+        }
     }
 
     fn plane_choice(&mut self, ui: &mut Ui) {
@@ -289,7 +312,6 @@ fn section(ui: &mut Ui, magnified: &MagnifiedJoint, height: f32) {
 fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2]) {
     const NONE: &str = "—";
     let report = &magnified.report;
-    ui.label(RichText::new(value::contact(report.state, magnified.kind.parts()[0])).strong());
     let speed = |si: f64| value::quantity(si, "m/s", 3);
     let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
     let [part, wall] = magnified.kind.parts();

@@ -9,7 +9,7 @@ use jointplay::simulate::{ContactMode, Frame, Simulation};
 use crate::hands::{opened, page::click};
 use crate::pixels::Picture;
 
-const WIDE: [f32; 2] = [1280.0, 800.0];
+const WIDE: [f32; 2] = [1600.0, 900.0];
 
 /// A block that lies in its guide and is pushed to and fro beyond the limit of friction.
 const PUSHED: &str = r#"
@@ -210,7 +210,7 @@ fn it_follows_a_playing_run_into_the_past_and_through_a_restart() {
 
 #[test]
 fn it_lies_within_the_panel_also_enlarged_and_in_a_presentation() {
-    for (size, zoom) in [(WIDE, 1.0), ([2560.0, 1600.0], 2.0), ([390.0, 844.0], 1.0)] {
+    for (size, zoom) in [(WIDE, 1.0), ([3200.0, 1800.0], 2.0), ([390.0, 844.0], 1.0)] {
         let mut harness = pushed(size, egui::Theme::Dark, &[]);
         harness.ctx.set_zoom_factor(zoom);
         harness.run();
