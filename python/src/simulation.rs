@@ -443,13 +443,13 @@ impl PySimulation {
 /// The places where the joints with play can touch: those that the frame lists, and for each joint with one place that.
 fn sites(frame: &Frame) -> impl Iterator<Item = SiteReport> + '_ {
     let only = |joint: usize, report: &JointReport| {
-        let &JointReport { penetration, normal_force, friction_force, contact_point, .. } = report;
+        let &JointReport { penetration, normal_force, friction_force, contact_point, sliding, .. } = report;
         match report.state {
             ContactMode::Ideal => {
                 let [normal_force, friction_force] = [Vec3::zeros(); 2];
-                SiteReport { joint, gap: f64::INFINITY, normal_force, friction_force, contact_point }
+                SiteReport { joint, gap: f64::INFINITY, normal_force, friction_force, contact_point, sliding }
             }
-            _ => SiteReport { joint, gap: -penetration, normal_force, friction_force, contact_point },
+            _ => SiteReport { joint, gap: -penetration, normal_force, friction_force, contact_point, sliding },
         }
     };
     frame.joints.iter().enumerate().flat_map(move |(joint, report)| {

@@ -1,10 +1,11 @@
 //! Place of a parameter in the equations, for its tooltip: name of the law, formula, and the paper's equation number or, for a
 //! law not used in the paper, its publication. The formulas are those of the laws themselves (`contact`).
 
-use crate::contact::{ElasticLaw, Parameters, ShownLaw};
+use crate::contact::{ElasticLaw, FrictionLaw, Parameters, ShownLaw};
 use crate::scene::Scene;
 
-/// The law of `scene` that uses the parameter `key`; `None` unless it is a contact parameter.
+/// The law of `scene` that uses the parameter `key`; `None` unless it is a contact parameter that the laws in force use. Without friction
+/// that law stands for every parameter of friction.
 pub fn law(key: &str, scene: &Scene) -> Option<ShownLaw> {
     let (group, last) = key.rsplit_once('.')?;
     let contact = match group.strip_prefix("joint.") {
@@ -18,10 +19,14 @@ pub fn law(key: &str, scene: &Scene) -> Option<ShownLaw> {
 /// The same for the last part of its key.
 fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
     let [friction, correction] = contact.friction_law.shown();
+    let of =
+        |law: FrictionLaw, shown: ShownLaw| [law, FrictionLaw::None].contains(&contact.friction_law).then_some(shown);
     Some(match last {
         "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => ElasticLaw::shown(contact.elasticity),
         "friction" | "friction_law" => friction,
-        "slip_speed_low" | "slip_speed_high" => correction,
+        "slip_speed_low" | "slip_speed_high" => return of(FrictionLaw::ModifiedCoulomb, correction),
+        "static_friction_ratio" | "stribeck_speed" => return of(FrictionLaw::Bristle, correction),
+        "bristle_stiffness" | "bristle_damping" => return of(FrictionLaw::Bristle, friction),
         "restitution" | "normal_law" => contact.normal_law.shown(contact.elasticity),
         _ => return None,
     })
@@ -43,6 +48,25 @@ mod tests {
         assert_eq!(law("joint.S2.restitution", &scene), Some(NormalLaw::Hertz.shown(Elasticity::Sphere)));
         assert_eq!(law("contact.friction", &scene).expect("stated").formula, "F = 0");
         assert_eq!(law("spcmm.frequency", &scene), None);
+    }
+
+    #[test]
+    fn a_parameter_of_friction_shows_the_law_in_force_if_that_uses_it() {
+        let own = |key: &str, friction_law| law_of(key, &Parameters { friction_law, ..Parameters::default() });
+        let [bristle, coulomb, none] = [FrictionLaw::Bristle, FrictionLaw::ModifiedCoulomb, FrictionLaw::None];
+        for (key, user, symbol) in [
+            ("slip_speed_low", coulomb, "v0"),
+            ("slip_speed_high", coulomb, "v1"),
+            ("static_friction_ratio", bristle, "μ_s"),
+            ("stribeck_speed", bristle, "v_s"),
+            ("bristle_stiffness", bristle, "k z"),
+            ("bristle_damping", bristle, "d v"),
+        ] {
+            assert!(own(key, user).is_some_and(|shown| shown.formula.contains(symbol)), "{key}");
+            let other = if user == bristle { coulomb } else { bristle };
+            assert_eq!(own(key, other), None, "{key}");
+            assert_eq!(own(key, none).map(|shown| shown.formula), Some("F = 0"), "{key}");
+        }
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! The microscope: magnifies one joint with play beside the 3D view until its play is visible.
 
 mod draw;
+mod friction;
 mod magnified_joint;
 mod pin;
 mod slide;
 
-use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, TextStyle, Ui, WidgetInfo, vec2};
 use glam::Vec3;
 
 use super::keys::Action;
@@ -17,6 +18,7 @@ use crate::machine::LooseKind;
 use crate::simulate::ContactMode;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
+pub use friction::{CurvePoint, FrictionCurve, FrictionScale};
 use magnified_joint::MagnifiedJoint;
 
 /// Least width and height, points.
@@ -33,6 +35,8 @@ const MIN_REMAINDER: f32 = 120.0;
 /// Height of the section of the contact, and least height in a low panel, points.
 const SECTION_HEIGHT: f32 = 112.0;
 const MIN_SECTION_HEIGHT: f32 = 76.0;
+/// Height of the panel from which it has the diagram of friction, points.
+const MIN_HEIGHT_WITH_FRICTION: f32 = 180.0;
 /// Width from which pictures and numbers are side by side, points.
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 430.0;
 /// Least side of a phone's picture with the choice of the plane in sight below it, points.
@@ -49,6 +53,7 @@ pub struct Microscope {
     joint: usize,
     plane: Plane,
     circle: Option<Circle>,
+    friction: Option<(FrictionCurve, FrictionScale)>,
 }
 
 impl Microscope {
@@ -77,10 +82,16 @@ impl Microscope {
         self.circle
     }
 
+    /// Friction over sliding, as last drawn; `None` if it was not.
+    pub fn friction(&self) -> Option<&(FrictionCurve, FrictionScale)> {
+        self.friction.as_ref()
+    }
+
     /// The panel, beside the picture or below it in a tall `ui`; `view`: world vectors to the right and up in the 3D view.
     /// Returns the joint selected in it.
     fn ui(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
         self.circle = None;
+        self.friction = None;
         let room = ui.available_size();
         let (room, least, panel) = if room.x > room.y {
             (room.x, MIN_SIZE.x, Panel::right("microscope"))
@@ -133,48 +144,89 @@ impl Microscope {
         };
         let space = ui.available_size();
         let axes = self.plane.axes(player.running().view.down, view);
+        let has_friction = self.has_friction(player, space.y);
         if space.x >= MIN_WIDTH_SIDE_BY_SIDE && space.x > space.y {
             ui.horizontal_top(|ui| {
                 let side = (space.x - NUMBERS_WIDTH - 8.0).min(space.y).max(96.0);
                 self.picture(ui, player, &magnified, axes, vec2(side, side));
                 ui.vertical(|ui| {
                     scrolled(ui, |ui| {
+                        let mut left = space.y;
                         if magnified.has_section() {
                             section(ui, &magnified, SECTION_HEIGHT);
+                            left -= SECTION_HEIGHT + ui.spacing().item_spacing.y;
                         }
-                        numbers(ui, player, &magnified, axes);
+                        self.below_pictures(ui, player, &magnified, (axes, has_friction.then_some(left)));
                     });
                 });
             });
         } else {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
+                let gap = ui.spacing().item_spacing.y;
+                // The state of the contact stays in sight, then the diagram of friction if the circle leaves it room.
+                let state = ui.text_style_height(&TextStyle::Body) + gap;
+                let section_height = if magnified.has_section() { MIN_SECTION_HEIGHT + gap } else { 0.0 };
+                let below = section_height + state + friction::MIN_HEIGHT + 2.0 * gap;
+                let reserves = has_friction && below <= MAX_FRACTION * space.y;
                 let side = if is_narrow {
                     // The choice below is shown whole or is scrolled to: a strip of it would look like a mistake.
-                    let choice = ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
+                    let choice = ui.spacing().interact_size.y + gap;
                     let above = space.y - choice;
                     if above >= MIN_SIDE_ABOVE_CHOICE { width.min(above) } else { space.y }
                 } else {
-                    draw::side(vec2(width, space.y), 150.0)
+                    let largest = draw::side(vec2(width, space.y), 150.0);
+                    if reserves { largest.min(space.y - below) } else { largest }
                 };
                 self.picture(ui, player, &magnified, axes, vec2(width, side));
                 if is_narrow {
                     self.plane_choice(ui);
                 }
-                let left = space.y - side - ui.spacing().item_spacing.y;
+                let mut left = space.y - side - gap;
                 if magnified.has_section() {
-                    section(ui, &magnified, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
+                    let most = if reserves { left - (below - section_height) } else { left };
+                    let height = most.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT);
+                    section(ui, &magnified, height);
+                    left -= height + gap;
                 }
-                numbers(ui, player, &magnified, axes);
+                self.below_pictures(ui, player, &magnified, (axes, has_friction.then_some(left)));
             });
         }
         chosen
+    }
+
+    /// What is below the pictures, with the diagram of friction in `room`, points, if there is one: above the numbers if it fits there.
+    fn below_pictures(
+        &mut self,
+        ui: &mut Ui,
+        player: &Player,
+        magnified: &MagnifiedJoint,
+        (axes, room): ([Vec3; 2], Option<f32>),
+    ) {
+        let top = ui.cursor().top();
+        ui.label(RichText::new(value::contact(magnified.report.state, magnified.kind.parts()[0])).strong());
+        let room = room.map(|room| room - (ui.cursor().top() - top));
+        let fits = room.is_some_and(|room| room >= friction::MIN_HEIGHT);
+        let height = room.map(|room| room.clamp(friction::MIN_HEIGHT, friction::HEIGHT));
+        if let Some(height) = height.filter(|_| fits) {
+            self.friction = friction::diagram(ui, player, magnified, (self.joint, height));
+        }
+        numbers(ui, player, magnified, axes);
+        if let Some(height) = height.filter(|_| !fits) {
+            self.friction = friction::diagram(ui, player, magnified, (self.joint, height));
+        }
     }
 
     fn plane_choice(&mut self, ui: &mut Ui) {
         let help = "Plane of the picture, seen along its normal: as the 3D view, or that of two world axes";
         let names = ["Plane of the microscope", help];
         layout::choice(ui, names, Some(54.0), &mut self.plane, Plane::ALL, Plane::label);
+    }
+
+    /// Whether the diagram of friction is shown in a panel `height` points high: not in a low one, and not without friction.
+    fn has_friction(&self, player: &Player, height: f32) -> bool {
+        let joint = player.running().machine.loose_joints.get(self.joint);
+        height >= MIN_HEIGHT_WITH_FRICTION && joint.is_some_and(|joint| friction::is_shown(&joint.contact))
     }
 
     /// The picture of the play.
@@ -260,7 +312,6 @@ fn section(ui: &mut Ui, magnified: &MagnifiedJoint, height: f32) {
 fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2]) {
     const NONE: &str = "—";
     let report = &magnified.report;
-    ui.label(RichText::new(value::contact(report.state, magnified.kind.parts()[0])).strong());
     let speed = |si: f64| value::quantity(si, "m/s", 3);
     let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
     let [part, wall] = magnified.kind.parts();

@@ -83,7 +83,7 @@ use eframe::egui_wgpu;
 
 use crate::machine::Vec3;
 use crate::session::pace::LONGEST_FRAME;
-use crate::session::{link, load, log, paths, player, twin, value, watch};
+use crate::session::{friction, link, load, log, paths, player, twin, value, watch};
 use crate::simulate::StartError;
 use crate::view::Quality;
 
@@ -112,7 +112,7 @@ use lesson::Course;
 pub use lesson::{BUILT_IN_LESSONS, Lesson, RunningLesson, lesson_titles};
 pub use log::{Entry, Event, Log};
 use messages::Messages;
-pub use microscope::{Circle, Microscope};
+pub use microscope::{Circle, CurvePoint, FrictionCurve, FrictionScale, Microscope};
 pub use options::AppOptions;
 pub use overlay::{Overlay, Room, Strips, force_notes, strips, triad};
 use panels::{Panels, Sheet};

@@ -465,7 +465,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         let words = format!("Contacts before {} are no longer stored", value::time(known));
         ui.label(words);
     }
-    rows_of_key(ui);
+    rows_of_key(ui, &rows_for(player));
     let help = "Of a pin its end a is above and b below, of a block the walls +y, −y, +z, −z from above. Click or drag to go to an \
                 instant; wheel or pinch to zoom; double-click to show the whole run.";
     ui.label(egui::RichText::new(help).small().color(faint(ui)));
@@ -489,6 +489,10 @@ const KEY: [(Sign, &str, &str); 5] = [
     (Sign::Pale, "later", "Not replayed yet, or abandoned"),
     (Sign::Flag, "change", "A parameter was changed, or a body pulled"),
 ];
+/// What the full colour means where contacts stick instead of creeping, and where some do.
+const STICKS: (&str, &str) = ("sticks", "Sticks: friction is below its limit");
+const CREEPS_OR_STICKS: (&str, &str) =
+    ("creeps, sticks", "Creeps: too slow for full friction; or sticks: friction is below its limit");
 /// Size of a sign in the key, points.
 const SIGN_SIZE: egui::Vec2 = vec2(12.0, 9.0);
 /// Least number of signs in the line of the key: those of every run.
@@ -511,13 +515,26 @@ impl Sign {
     }
 }
 
+/// The key for the friction laws of the run.
+fn rows_for(player: &Player) -> [(Sign, &'static str, &'static str); 5] {
+    let joints = &player.running().machine.loose_joints;
+    let with_play = joints.iter().filter(|joint| !joint.contact.is_ideal()).count();
+    let sticking = joints.iter().filter(|joint| joint.contact.has_bristles()).count();
+    let mut rows = KEY;
+    if sticking > 0 {
+        (rows[2].1, rows[2].2) = if sticking == with_play { STICKS } else { CREEPS_OR_STICKS };
+    }
+    rows
+}
+
 /// The key in one line, at the right end of `ui`, if there is room.
-pub fn key(ui: &mut Ui) {
+pub fn key(ui: &mut Ui, player: &Player) {
+    let rows = rows_for(player);
     let font = egui::TextStyle::Small.resolve(ui.style());
     let ink = ui.visuals().weak_text_color();
     let [after_sign, after_word] = KEY_GAPS;
     let (mut words, mut width, mut height) = (Vec::new(), -after_word, SIGN_SIZE.y);
-    for (sign, word, _) in KEY {
+    for (sign, word, _) in rows {
         let word = ui.painter().layout_no_wrap(word.to_owned(), font.clone(), ink);
         let wider = width + after_word + SIGN_SIZE.x + after_sign + word.size().x;
         if wider > ui.available_width() {
@@ -530,7 +547,7 @@ pub fn key(ui: &mut Ui) {
         return;
     }
     let (rect, response) = ui.allocate_exact_size(vec2(width, height), Sense::hover());
-    let all = KEY.map(|(_, _, words)| words).join(". ");
+    let all = rows.map(|(_, _, words)| words).join(". ");
     response
         .widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Label, true, format!("Key of the timeline. {all}")));
     let mut x = rect.left();
@@ -545,12 +562,12 @@ pub fn key(ui: &mut Ui) {
     response.on_hover_ui(|ui| {
         ui.strong("The lanes of the timeline");
         ui.label("One lane for each joint with play, in the colours of the plots.");
-        rows_of_key(ui);
+        rows_of_key(ui, &rows);
     });
 }
 
-fn rows_of_key(ui: &mut Ui) {
-    for (sign, _, words) in KEY {
+fn rows_of_key(ui: &mut Ui, rows: &[(Sign, &str, &str)]) {
+    for &(sign, _, words) in rows {
         ui.horizontal(|ui| {
             let (rect, _) = ui.allocate_exact_size(SIGN_SIZE, Sense::hover());
             sign.paint(ui, rect);

@@ -53,7 +53,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Action> {
                 ui.add_space(6.0);
                 speed(ui, player, narrow);
                 settled_hint(ui, player);
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), timeline::key);
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| timeline::key(ui, player));
             }
             asked
         })

@@ -5,6 +5,7 @@ pub mod clock;
 mod companion;
 pub mod embedded;
 pub mod expected;
+pub mod friction;
 pub mod goal;
 pub mod history;
 pub mod ideal;

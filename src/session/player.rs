@@ -11,6 +11,7 @@ mod travel;
 
 use super::advice::{self, Advice};
 use super::clock::{Clock, wall};
+use super::friction::FrictionRecord;
 use super::goal::Goal;
 use super::history::History;
 use super::ideal::{AppliedHistory, Ideal};
@@ -237,6 +238,11 @@ impl Player {
     /// The recent paths of the parts of joints with play.
     pub fn paths(&self) -> &Paths {
         &self.record.paths
+    }
+
+    /// The recent friction at the contacts of joints with play.
+    pub fn friction(&self) -> &FrictionRecord {
+        &self.record.friction
     }
 
     /// Events from the start of the run to the displayed instant.
@@ -741,6 +747,7 @@ impl Player {
         self.record.watch.record(&frame);
         self.record.settling.record(&frame);
         self.record.paths.record(&frame);
+        self.record.friction.record(&frame);
         self.record.recorded = frame;
     }
 

@@ -20,6 +20,7 @@ mod frames;
 mod golden;
 mod hands;
 mod headless_window;
+mod hysteresis;
 mod impacts;
 mod instruments;
 mod lecture;

@@ -13,7 +13,7 @@ use crate::view::{Palette, Theme, to_f32};
 /// Radius of the clearance circle, as a fraction of the picture's side.
 const CIRCLE_RADIUS: f32 = 0.39;
 /// Radius of the ball-centre mark, points.
-const CENTRE_RADIUS: f32 = 4.5;
+pub const CENTRE_RADIUS: f32 = 4.5;
 /// Length of the arrow at the reference speed, points.
 const ARROW_LENGTH: f32 = 40.0;
 /// Width and height of the words in the upper left corner of the sphere's picture, of the axes in the lower left, and height and least
@@ -84,7 +84,7 @@ impl Plane {
 }
 
 /// Largest 1, 2 or 5 times a power of ten not above `value` > 0.
-fn round_down(value: f64) -> f64 {
+pub fn round_down(value: f64) -> f64 {
     let power = 10_f64.powf(value.log10().floor());
     let steps = [5.0, 2.0, 1.0].map(|step| step * power);
     let fits = steps.into_iter().find(|step| *step <= value * 1.000_001);
@@ -115,7 +115,7 @@ pub struct Sheet<'a> {
     pub(super) palette: Palette,
     pub(super) ink: Color32,
     pub(super) faint: Color32,
-    background: Color32,
+    pub(super) background: Color32,
     magnified: &'a MagnifiedJoint,
 }
 
@@ -279,20 +279,31 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
 
 /// A path up to the point `end`, which is there at `now`, s; it fades with age. `place` projects a position, world axes.
 pub fn path(sheet: &Sheet<'_>, painter: &Painter, points: &[Point], now: f64, place: impl Fn(Vec3) -> Pos2, end: Pos2) {
-    let new_colour = colour(sheet.palette.trail);
-    let old_colour = sheet.faint.gamma_multiply(0.45);
-    let start = points.first().map_or(now, |point| point.time);
-    let age = (now - start).max(f64::MIN_POSITIVE);
     let column = |i: usize| to_f32(&sheet.magnified.carrier.column(i).into_owned());
     let carrier = glam::Mat3::from_cols(column(0), column(1), column(2));
+    let places = points.iter().map(|point| (point.time, place(carrier * Vec3::from_array(point.position))));
+    fading(sheet, painter, colour(sheet.palette.trail), places, (now, end));
+}
+
+/// A curve through places with their times, s, up to the last, `end`; it fades with age.
+pub fn fading(
+    sheet: &Sheet<'_>,
+    painter: &Painter,
+    new_colour: Color32,
+    places: impl Iterator<Item = (f64, Pos2)>,
+    (now, end): (f64, Pos2),
+) {
+    let old_colour = sheet.faint.gamma_multiply(0.45);
+    let mut places = places.peekable();
+    let start = places.peek().map_or(now, |first| first.0);
+    let age = (now - start).max(f64::MIN_POSITIVE);
     let mut before: Option<Pos2> = None;
-    for point in points {
-        let at = place(carrier * Vec3::from_array(point.position));
+    for (time, at) in places {
         if let Some(from) = before {
             if from.distance(at) < MIN_DISTANCE {
                 continue;
             }
-            let fraction = ((point.time - start) / age) as f32;
+            let fraction = ((time - start) / age) as f32;
             let stroke = Stroke::new(1.2 + 0.6 * fraction, old_colour.lerp_to_gamma(new_colour, fraction));
             painter.line_segment([from, at], stroke);
         }
@@ -301,6 +312,17 @@ pub fn path(sheet: &Sheet<'_>, painter: &Painter, points: &[Point], now: f64, pl
     if let Some(from) = before {
         painter.line_segment([from, end], Stroke::new(1.8, new_colour));
     }
+}
+
+/// A curve of one colour.
+pub fn polyline(painter: &Painter, places: impl Iterator<Item = Pos2>, stroke: Stroke) {
+    let mut drawn: Vec<Pos2> = Vec::new();
+    for at in places {
+        if drawn.last().is_none_or(|last| last.distance(at) >= MIN_DISTANCE) {
+            drawn.push(at);
+        }
+    }
+    painter.line(drawn, stroke);
 }
 
 /// How long before `now` a path begins.

@@ -6,7 +6,7 @@ use super::draw;
 use crate::app::paths::axes_of;
 use crate::app::player::Player;
 use crate::app::value;
-use crate::contact::{Coefficients, ElasticLaw};
+use crate::contact::ElasticLaw;
 use crate::machine::{Attachment, LooseKind, Mat3, Vec3};
 use crate::simulate::{ContactMode, Frame, Impact, JointReport, SiteReport};
 
@@ -54,13 +54,11 @@ pub struct ContactPatch {
     pub radius: Option<f64>,
 }
 
-/// Velocity of an attachment point, m/s, and angular velocity of its body, rad/s; zero for the world.
-fn velocity_of(frame: &Frame, at: &Attachment) -> (Vec3, Vec3) {
+/// Velocity of an attachment point, m/s; zero for the world.
+fn velocity_of(frame: &Frame, at: &Attachment) -> Vec3 {
     let motion = at.body.and_then(|body| frame.bodies.get(body));
-    motion.map_or((Vec3::zeros(), Vec3::zeros()), |motion| {
-        let spin = motion.angular_velocity;
-        let arm = motion.rotation * at.point;
-        (motion.velocity + spin.cross(&arm), spin)
+    motion.map_or_else(Vec3::zeros, |motion| {
+        motion.velocity + motion.angular_velocity.cross(&(motion.rotation * at.point))
     })
 }
 
@@ -73,17 +71,10 @@ impl MagnifiedJoint {
         let distance = report.eccentricity.norm();
         let ideal = report.state == ContactMode::Ideal;
         let normal = (distance > 0.0 && !ideal).then(|| report.eccentricity / distance);
-        let (ball, ball_spin) = velocity_of(frame, &spec.carried());
-        let (socket, socket_spin) = velocity_of(frame, &spec.carrier());
-        let velocity = ball - socket;
+        let velocity = velocity_of(frame, &spec.carried()) - velocity_of(frame, &spec.carrier());
         let touches = report.state.touches();
-        let is_ball = spec.kind == LooseKind::Ball;
-        let sliding = normal.filter(|_| touches && is_ball).map(|normal| {
-            let law = Coefficients::new(&spec.contact, report.clearance);
-            let gap = law.separation(&report.eccentricity, &velocity);
-            let slip_velocity = law.slip_velocity(&normal, &velocity, [&ball_spin, &socket_spin], law.socket_levers());
-            gap.sliding_velocity(&slip_velocity)
-        });
+        let slides = touches && normal.is_some() && spec.kind == LooseKind::Ball;
+        let sliding = slides.then_some(report.sliding.velocity);
         let mut impacts = player.impact_record().latest(Some(joint), shown);
         let impact = impacts.next().copied();
         let first = impacts.nth(IMPACTS - 2);

@@ -159,7 +159,7 @@ fn drop_before<T>(states: &mut Vec<(f64, T)>, time: f64) {
 mod tests {
     use super::*;
     use crate::machine::Vec3;
-    use crate::simulate::{JointReport, SiteReport};
+    use crate::simulate::{JointReport, SiteReport, Sliding};
 
     fn frame(time: f64, state: ContactMode) -> Frame {
         Frame { time, joints: vec![JointReport { state, ..JointReport::default() }], ..Frame::default() }
@@ -226,8 +226,14 @@ mod tests {
         // The ends of joint 1 touch one after the other, then both, then neither.
         let gaps = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, -1.0]];
         for (index, gaps) in gaps.into_iter().enumerate() {
-            let site =
-                |gap| SiteReport { joint: 1, gap, normal_force: zero, friction_force: zero, contact_point: zero };
+            let site = |gap| SiteReport {
+                joint: 1,
+                gap,
+                normal_force: zero,
+                friction_force: zero,
+                contact_point: zero,
+                sliding: Sliding::default(),
+            };
             let joints = vec![JointReport::default(); 2];
             let sites = gaps.map(site).to_vec();
             history.record(&Frame { time: index as f64, joints, sites, ..Frame::default() });

@@ -3,6 +3,7 @@
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
 use crate::scene::Scene;
+use crate::session::friction::FrictionRecord;
 use crate::session::history::{Bin, History, Mark};
 use crate::session::paths::Paths;
 use crate::session::settled::Settling;
@@ -36,6 +37,7 @@ pub(super) struct Record {
     pub values: Vec<f64>,
     pub settling: Settling,
     pub paths: Paths,
+    pub friction: FrictionRecord,
     pub watch: RunWatch,
 }
 
@@ -59,6 +61,7 @@ impl Record {
             values: Vec::new(),
             settling: Settling::new(scene),
             paths: Paths::new(scene),
+            friction: FrictionRecord::new(scene),
             watch: RunWatch::new(scene),
         }
     }
@@ -130,6 +133,7 @@ impl Record {
         if time > self.recorded_to {
             // The time skipped was not recorded.
             self.paths = Paths::new(scene);
+            self.friction = FrictionRecord::new(scene);
         }
         self.recorded_to = time;
         self.watch.go_to(time);

@@ -153,6 +153,8 @@ pub struct JointReport {
     pub contact_point: Vec3,
     /// Sliding speed used by the friction law, m/s.
     pub slip_speed: f64,
+    /// Sliding of the ball over the socket.
+    pub sliding: Sliding,
     /// Contact state.
     pub state: ContactMode,
 }
@@ -170,6 +172,18 @@ pub struct SiteReport {
     pub friction_force: Vec3,
     /// Where the forces act, m.
     pub contact_point: Vec3,
+    /// Sliding of the carried part over the carrier there.
+    pub sliding: Sliding,
+}
+
+/// Sliding of the two surfaces of a contact, and the friction that limits it; zero where they do not touch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sliding {
+    /// Sliding velocity in the sense of the friction law, whether or not that exerts a force, m/s, world axes; of several contacts that
+    /// of the deepest.
+    pub velocity: Vec3,
+    /// Largest friction force that the law allows at this normal force and sliding speed, N; of several contacts the sum.
+    pub limit: f64,
 }
 
 /// The largest force on a joint with play since the peaks were last taken.

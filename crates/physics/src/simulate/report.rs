@@ -1,7 +1,7 @@
 //! Fills a [`Frame`] from the latest evaluation of the equations.
 
 use super::angles::pose_of;
-use super::frame::{BodyMotion, ContactMode, Frame, JointReport, SiteReport};
+use super::frame::{BodyMotion, ContactMode, Frame, JointReport, SiteReport, Sliding};
 use crate::contact::ContactState;
 use crate::machine::{Attachment, LooseJoint, LooseKind, Machine, Vec3};
 use crate::mechanism::{ContactId, Contacts, Mechanism, angle_of};
@@ -99,6 +99,10 @@ fn joint_report(
         penetration_rate: gap.separation.rate,
         contact_point: mechanism.contact_point(c),
         slip_speed: gap.slip_speed,
+        sliding: Sliding {
+            velocity: sliding_velocity(mechanism, c),
+            limit: contacts.of_joint(j).map(|c| friction_limit(contacts, c)).sum(),
+        },
         normal_force: sum(&normal),
         friction_force: sum(&friction),
         state: if !contact_states[c].active && gap.normal_force == 0.0 {
@@ -113,6 +117,23 @@ fn joint_report(
         },
         ..report
     }
+}
+
+/// Sliding velocity of the carried part at contact `c`, m/s; zero where it does not touch.
+fn sliding_velocity(mechanism: &Mechanism, c: ContactId) -> Vec3 {
+    let contacts = &mechanism.contacts;
+    let at = &contacts.gap(c).separation;
+    if at.penetration <= 0.0 {
+        return Vec3::zeros();
+    }
+    let velocity = at.sliding_velocity(&contacts.slip_velocity(c, &at.normal, mechanism.motion()));
+    contacts.on_carried(c, &velocity)
+}
+
+/// Largest friction force at contact `c`, N.
+fn friction_limit(contacts: &Contacts, c: ContactId) -> f64 {
+    let (gap, law) = (contacts.gap(c), contacts.coefficients(c));
+    gap.normal_force * law.bristles.map_or(law.friction, |bristles| bristles.coefficient(gap.slip_speed))
 }
 
 /// Whether contact `c` presses and has bristles below their limit.
@@ -146,8 +167,14 @@ fn displacement(mechanism: &Mechanism, joint: &LooseJoint, j: usize) -> (Vec3, f
 fn report_sites(mechanism: &Mechanism, joint: &LooseJoint, j: usize, out: &mut Vec<SiteReport>) {
     let first = out.len();
     let zero = Vec3::zeros();
-    let nothing =
-        SiteReport { joint: j, gap: f64::INFINITY, normal_force: zero, friction_force: zero, contact_point: zero };
+    let nothing = SiteReport {
+        joint: j,
+        gap: f64::INFINITY,
+        normal_force: zero,
+        friction_force: zero,
+        contact_point: zero,
+        sliding: Sliding::default(),
+    };
     out.extend(joint.kind.site_names().iter().map(|_| nothing));
     if out.len() == first {
         return;
@@ -158,10 +185,12 @@ fn report_sites(mechanism: &Mechanism, joint: &LooseJoint, j: usize, out: &mut V
         let gap = contacts.gap(c);
         site.normal_force += contacts.push(c) * gap.normal_force;
         site.friction_force += contacts.on_carried(c, &gap.friction);
+        site.sliding.limit += friction_limit(contacts, c);
         // Of the points of a rim, the one that is deepest.
         if -gap.separation.penetration < site.gap {
             site.gap = -gap.separation.penetration;
             site.contact_point = mechanism.contact_point(c);
+            site.sliding.velocity = sliding_velocity(mechanism, c);
         }
     }
 }
