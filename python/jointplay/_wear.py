@@ -148,7 +148,7 @@ def value_of(scene: Scene, key: str) -> float:
 
 def seconds_of(scene: Scene, name: str, value: Quantity) -> float:
     """A time above 0, s."""
-    seconds = _native.read_number(scene._native, "solver.step", value) if isinstance(value, str) else float(value)
+    seconds = _native.read_number(scene.native, "solver.step", value) if isinstance(value, str) else float(value)
     if not 0.0 < seconds < np.inf:
         raise OptionError(f"{name} = {value!r}: allowed times above 0 s")
     return seconds
