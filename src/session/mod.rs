@@ -19,3 +19,4 @@ mod settled;
 pub mod twin;
 pub mod value;
 pub mod watch;
+mod worn;

@@ -37,3 +37,4 @@ mod touch;
 mod undo;
 mod visit;
 mod window;
+mod worn;
