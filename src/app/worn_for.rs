@@ -23,6 +23,8 @@ const SECONDS: f64 = 3600.0;
 const HOUR_DIGITS: usize = 3;
 const SHOWN_DIGITS: usize = 3;
 const SET_DIGITS: usize = 9;
+/// Space below the slider, points.
+const RING: f32 = 4.0;
 /// Most lines of plays; the last of more says how many are left out.
 const MAX_LINES: usize = 4;
 /// Most ages remembered for undo and redo.
@@ -220,6 +222,8 @@ impl WornFor {
         let shown = self.draft.as_ref().map_or(age.hours(), |draft| draft.hours);
         spoken::value(&response, &in_hours(shown));
         response.clone().accessible_name(NAME);
+        // A lesson's ring around the slider needs it.
+        ui.add_space(RING);
         self.words(ui, player, (plays, age, rates), shown);
         // With the keys the handle takes several steps.
         let by_keys = response.has_focus() && !response.dragged();
