@@ -258,3 +258,34 @@ fn keys_move_the_handle_and_enter_lets_go() {
     assert_ne!(clearances(&harness), set);
     assert!(shown(&harness) < 0.1 * PERIOD, "restarted");
 }
+
+#[test]
+fn many_plays_have_four_lines_and_two_of_a_joint_their_names() {
+    let opened = |scene: &str, own: &[(&str, &str)]| {
+        let changes = [own, &[("contact.wear_coefficient", "1e-14 m^2/N")]].concat();
+        opened(scene, &changes, [1280.0, 800.0], egui::Theme::Light, crate::common::ticking_clock::<10>)
+    };
+    assert!(shows_text(&opened("hexapod", &[]), "and 9 more"));
+    // One pin of the excavator also plays along its axis.
+    let own = [("joint.boom-pin.play.face_radius", "60 mm"), ("joint.boom-pin.play.axial", "0.2 mm")];
+    let mut harness = opened("excavator", &own);
+    let plays = |harness: &Harness<'_, App>| -> Vec<[f64; 2]> {
+        let joints = &harness.state().player().pending().machine.loose_joints;
+        joints.iter().map(|joint| joint.contact.clearances()).collect()
+    };
+    let set = plays(&harness);
+    for name in ["boom-pin, radial 0.5 mm", "boom-pin, axial 0.2 mm", "stick-pin 0.5 mm"] {
+        assert!(shows_text(&harness, name), "{name}");
+    }
+    harness.state_mut().run_to(4.1);
+    harness.run_steps(3);
+    let rates = harness.state().player().wear_rates().expect("a period");
+    set_hours(&mut harness, 100.0);
+    for ((before, after), rates) in set.iter().zip(plays(&harness)).zip(rates) {
+        for play in 0..2 {
+            let wanted = before[play] + rates[play] * 100.0 * 3600.0;
+            assert!((after[play] - wanted).abs() < 1e-12, "{after:?} {before:?} {rates:?}");
+        }
+        assert!(rates[0] > 0.0);
+    }
+}
