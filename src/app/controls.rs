@@ -13,6 +13,7 @@ use eframe::egui::text::{CCursor, CCursorRange};
 use super::accuracy;
 use super::icons::{Icon, icon_button};
 use super::player::Player;
+use super::worn_for::WornFor;
 use super::{equations, keys, layout, spoken, theme, value};
 use crate::scene::{Kind, OWN_GROUP, Parameter, SceneError, Scope, SetError, Value};
 use crate::simulate::{CLEARANCE_SPEED, Effect};
@@ -54,6 +55,7 @@ pub struct Controls {
     joint: usize,
     /// Key of a joint whose slider is scrolled into view and focused.
     revealed: Option<String>,
+    worn_for: WornFor,
     /// Whether tooltips say only what a first visit is told.
     plain: bool,
     /// Whether the user asked for a restart, which applies the changes that wait for it.
@@ -91,6 +93,7 @@ impl Controls {
     pub fn clear(&mut self) {
         self.drafts.clear();
         self.joint = 0;
+        self.worn_for = WornFor::default();
     }
 
     /// Brings the slider of `key`, which belongs to a joint with play, into view and focuses it.
@@ -102,6 +105,12 @@ impl Controls {
     /// Discards only partially typed values.
     pub fn forget_drafts(&mut self) {
         self.drafts.clear();
+        self.worn_for.forget_draft();
+    }
+
+    /// As [`WornFor::take_change`].
+    pub fn take_change(&mut self) -> Option<(String, [String; 2])> {
+        self.worn_for.take_change()
     }
 
     /// Whether the user has asked for a restart since the last call.
@@ -159,6 +168,11 @@ impl Controls {
                 self.control(ui, player, parameter, key);
                 ui.add_space(4.0);
             }
+        }
+        match self.worn_for.ui(ui, player) {
+            Ok(restarts) => self.asks_restart |= restarts,
+            // Its limit is that of the scene.
+            Err(_) => self.worn_for.forget_draft(),
         }
         // Parameters defined by the scene's author.
         for parameter in table.iter().filter(|p| is_scene_parameter(p)) {
@@ -580,18 +594,23 @@ fn is_in_use(ui: &Ui, response: &Response) -> bool {
 }
 
 /// Tooltip above or below a control within its panel: the control in use and the picture stay visible.
-fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
+pub(super) fn panel_tooltip(ui: &Ui, response: &Response, words: impl FnOnce(&mut Ui)) {
     if is_in_use(ui, response) {
         return;
     }
-    let Row { parameter, key, plain, .. } = *row;
     const ABOVE: [RectAlign; 1] = [RectAlign::TOP_START];
     let panel = ui.clip_rect().x_range();
     let row = Rect::from_x_y_ranges(panel, response.rect.y_range());
     let frame = Frame::popup(ui.style()).total_margin().sum().x;
     let mut tooltip = Tooltip::for_enabled(response).width(panel.span() - frame);
     tooltip.popup = tooltip.popup.anchor(row).align(RectAlign::BOTTOM_START).align_alternatives(&ABOVE);
-    tooltip.show(|ui| {
+    tooltip.show(words);
+}
+
+/// The same with what is to be said of a parameter.
+fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
+    let Row { parameter, key, plain, .. } = *row;
+    panel_tooltip(ui, response, |ui| {
         ui.strong(parameter.label);
         if let Some(words) = plain {
             ui.label(words);

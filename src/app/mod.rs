@@ -76,6 +76,7 @@ mod viewport;
 mod visit;
 #[cfg(not(target_arch = "wasm32"))]
 mod window;
+mod worn_for;
 mod zoom;
 
 use eframe::egui::{self, ThemePreference, Ui};

@@ -340,6 +340,7 @@ impl Run {
     pub(super) fn follow_changes(&mut self, ctx: &egui::Context, is_busy: bool, in_lesson: bool) {
         let (now, held) = ctx.input(|input| (input.time, input.pointer.any_down() || input.any_touches()));
         let edits = self.player.take_edits();
+        let named = self.controls.take_change();
         if is_busy {
             self.undo.view = None;
             return;
@@ -351,10 +352,13 @@ impl Run {
             let scene = self.player.pending();
             let kind = scene.parameter(&edit.key).ok().map(|parameter| &parameter.kind);
             let original = original.zip(kind).map(|(value, kind)| value::shown(&value, kind));
-            let ends = [&edit.before, &edit.after];
-            let [(name, before), (_, after)] =
-                ends.map(|text| name_and_value(scene, original.clone(), &edit.key, text.as_deref()));
-            self.undo.record(Entry { name, values: [before, after], change: Change::Parameters(edits), at: now }, held);
+            let (name, values) = named.unwrap_or_else(|| {
+                let ends = [&edit.before, &edit.after];
+                let [(name, before), (_, after)] =
+                    ends.map(|text| name_and_value(scene, original.clone(), &edit.key, text.as_deref()));
+                (name, [before, after])
+            });
+            self.undo.record(Entry { name, values, change: Change::Parameters(edits), at: now }, held);
         }
         self.follow_view(now, held, in_lesson);
         self.undo.held &= held;

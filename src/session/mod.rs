@@ -20,3 +20,4 @@ mod settled;
 pub mod twin;
 pub mod value;
 pub mod watch;
+mod worn;

@@ -21,6 +21,7 @@ use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::RunWatch;
+use super::worn::WearWatch;
 use crate::machine::AppliedForces;
 use crate::scene::{LiveScene, Scene, SetError, Value};
 use crate::simulate::{
@@ -258,6 +259,12 @@ impl Player {
     /// Wear of the sockets since the start, over the steps completed at the displayed instant.
     pub fn wear(&self) -> Option<&Wear> {
         self.simulation.wear()
+    }
+
+    /// Growth of both plays of each joint by wear, m/s, over the last full period of the drives before the displayed instant, without a
+    /// periodic drive over the last full second; `None` if there is none since the start or the latest change.
+    pub fn wear_rates(&self) -> Option<Vec<[f64; 2]>> {
+        self.record.worn.rates(self.pacer.shown())
     }
 
     /// Sets the drive phase of the sections.
@@ -523,7 +530,27 @@ impl Player {
             // A refused change must not abandon the future.
             self.pending().with(key, value)?;
         }
-        self.change(key, Event::set(key, value))
+        self.change(key, [Event::set(key, value)])
+    }
+
+    /// Changes several parameters as one change of `name`: to the values, as a user writes them, or where there is none to that of the
+    /// scene file.
+    ///
+    /// # Errors
+    /// As [`Self::set`]; nothing is changed then.
+    pub fn set_all(&mut self, name: &str, values: &[(String, Option<String>)]) -> Result<(), SetError> {
+        let mut scene = self.pending().clone();
+        for (key, value) in values {
+            match value {
+                Some(value) => scene = scene.with(key, value)?,
+                None => drop(scene.parameter(key)?),
+            }
+        }
+        let event = |(key, value): &(String, Option<String>)| match value {
+            Some(value) => Event::set(key, value),
+            None => Event::Original { key: key.clone() },
+        };
+        self.change(name, values.iter().map(event)).map(drop)
     }
 
     /// Records the edits relative to the changes `before`.
@@ -581,7 +608,7 @@ impl Player {
     /// As [`LiveScene::undo_change`]; the run is left unchanged.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SetError> {
         self.pending().parameter(key)?;
-        self.change(key, Event::Original { key: key.to_owned() })
+        self.change(key, [Event::Original { key: key.to_owned() }])
     }
 
     /// Starts, changes or ends a pull on a body.
@@ -609,6 +636,7 @@ impl Player {
     fn after_change(&mut self) {
         self.warnings = advice::of(self.pending());
         self.record.watch.restart(self.simulation.running(), self.simulation.time());
+        self.record.worn = WearWatch::new(self.simulation.running(), self.simulation.time());
         self.record.settling = Settling::new(self.simulation.running());
         // While the run is retraced, the twin may begin later than now.
         let now = self.simulation.time();
@@ -714,7 +742,9 @@ impl Player {
             }
         }
         self.commit_peaks(until);
-        self.record.watch.step(self.unchanged.as_deref_mut().unwrap_or(&mut self.simulation), until);
+        let run = self.unchanged.as_deref_mut().unwrap_or(&mut self.simulation);
+        self.record.watch.step(run, until);
+        self.record.worn.step(run, until);
     }
 
     /// Records the instant `time`, s, of the latest step.

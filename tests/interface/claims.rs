@@ -318,6 +318,12 @@ const CLAIMS: &[Claim] = &[
         let [a, b, ..] = &s.app().player().frame().sites[..] else { return false };
         a.normal_force.dot(&b.normal_force) < -0.9 * a.normal_force.norm() * b.normal_force.norm()
     }),
+    ("wear", 1, Begins, "Three balls carry this machine", |s| s.joints().len() == 3),
+    ("wear", 2, Begins, "Compare the plots of the normal force", |s| s.plots(&["Normal force, N", "S1", "S2", "S3"])),
+    ("wear", 3, Begins, "The slider takes the growth in the last turn", |s| {
+        s.app().player().wear_rates().is_some_and(|rates| rates.iter().all(|[rate, _]| *rate > 0.0))
+    }),
+    ("wear", 4, Begins, "The play of S1 has grown", |s| s.joint(0).clearance > 0.59e-3),
     ("twin", 1, Begins, "The violet ghost is a twin", |s| s.app().player().twin().is_some()),
     ("twin", 2, Begins, "The bench plots the distance of the twin against time", |s| plots_twin_distance(s)),
     ("twin", 2, Begins, "So far no ball touches its wall", |s| s.all_free()),

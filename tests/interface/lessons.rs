@@ -289,7 +289,7 @@ fn a_presented_lesson_is_legible_from_the_last_row() {
 }
 
 /// The lessons' stored steps, counted from 0.
-const STORED_STEPS: [(&str, usize); 11] = [
+const STORED_STEPS: [(&str, usize); 12] = [
     ("rattle", 1),
     ("first-impact", 3),
     ("clearance", 2),
@@ -301,6 +301,7 @@ const STORED_STEPS: [(&str, usize); 11] = [
     ("chaos", 0),
     ("to-the-class", 4),
     ("worn-hinge", 2),
+    ("wear", 2),
 ];
 
 #[test]

@@ -38,3 +38,4 @@ mod touch;
 mod undo;
 mod visit;
 mod window;
+mod worn;

@@ -16,7 +16,7 @@ macro_rules! lessons {
 }
 
 /// Name and text of each lesson, in the order of a lecture.
-pub const BUILT_IN_LESSONS: [(&str, &str); 11] = lessons![
+pub const BUILT_IN_LESSONS: [(&str, &str); 12] = lessons![
     "rattle",
     "first-impact",
     "clearance",
@@ -25,6 +25,7 @@ pub const BUILT_IN_LESSONS: [(&str, &str); 11] = lessons![
     "ideal",
     "forces",
     "worn-hinge",
+    "wear",
     "twin",
     "chaos",
     "to-the-class",

@@ -31,17 +31,24 @@ impl Player {
         self.before_change.copy.take()
     }
 
-    /// Applies and logs a change of `key` at the displayed instant; the future is abandoned. The run is copied before it, if
-    /// requested, unless the change belongs to the same gesture as the last or the value is the same.
-    pub(super) fn change(&mut self, key: &str, event: Event) -> Result<Effect, SetError> {
+    /// Applies and logs the `events` of a change of `key` at the displayed instant; the future is abandoned. The run is copied before it,
+    /// if requested, unless the change belongs to the same gesture as the last or the value is the same.
+    pub(super) fn change(&mut self, key: &str, events: impl IntoIterator<Item = Event>) -> Result<Effect, SetError> {
         let BeforeChange { enabled, gesture, .. } = &self.before_change;
         let copies_run = *enabled && gesture.as_deref() != Some(key);
         let copy = copies_run.then(|| Box::new(self.copy()));
         self.branch();
         let before = self.pending().changes.clone();
-        let effect = self.apply(&event)?;
-        self.log_event(event);
+        let mut outcome = Ok(Effect::Now);
+        for event in events {
+            outcome = self.apply(&event);
+            if outcome.is_err() {
+                break;
+            }
+            self.log_event(event);
+        }
         self.record_edits(&before);
+        let effect = outcome?;
         if let Some(copy) = copy.filter(|_| before != self.pending().changes) {
             self.before_change.copy = Some((copy, key.to_owned()));
             self.before_change.gesture = Some(key.to_owned());

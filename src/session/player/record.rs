@@ -8,6 +8,7 @@ use crate::session::history::{Bin, History, Mark};
 use crate::session::paths::Paths;
 use crate::session::settled::Settling;
 use crate::session::watch::RunWatch;
+use crate::session::worn::WearWatch;
 use crate::simulate::{Channels, Frame, Peak, RECORDED_JOINTS, State};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
@@ -39,6 +40,7 @@ pub(super) struct Record {
     pub paths: Paths,
     pub friction: FrictionRecord,
     pub watch: RunWatch,
+    pub worn: WearWatch,
 }
 
 impl Record {
@@ -63,6 +65,7 @@ impl Record {
             paths: Paths::new(scene),
             friction: FrictionRecord::new(scene),
             watch: RunWatch::new(scene),
+            worn: WearWatch::new(scene, 0.0),
         }
     }
     /// As [`History::bins`], from the window last retraced where possible.
@@ -126,6 +129,7 @@ impl Record {
         self.contact_history.truncate(state.time());
         self.impact_record.truncate(state);
         self.watch.truncate(state.time());
+        self.worn.truncate(state.time());
     }
 
     /// Continues from `time`, s, in a run of `scene`. Known data stay.
@@ -137,6 +141,7 @@ impl Record {
         }
         self.recorded_to = time;
         self.watch.go_to(time);
+        self.worn.go_back(scene, time);
         self.settling = Settling::new(scene);
         self.drop_peaks();
     }
