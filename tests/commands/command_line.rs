@@ -557,7 +557,7 @@ fn interrupted_run(times: &str, interrupt: &dyn Fn(&std::process::Child, &Path))
 fn lessons_are_listed_and_a_file_is_checked() {
     let folder = folder();
     let list = jointplay(folder.path(), "lessons").expect(0).stdout;
-    assert_eq!(list.lines().count(), 11, "{list}");
+    assert_eq!(list.lines().count(), 12, "{list}");
     assert!(list.starts_with("rattle "), "{list}");
     let printed = jointplay(folder.path(), "lessons rattle").expect(0).stdout;
     assert!(printed.contains("[x]  At nearly the same time") && printed.contains("7.8 ms"), "{printed}");
