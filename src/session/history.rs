@@ -238,8 +238,9 @@ impl History {
         }
     }
 
-    /// Widens the bins at `time` so that `channel` includes `value`: a peak between two steps.
-    pub fn widen(&mut self, time: f64, channel: usize, value: f64) {
+    /// Raises the bins at `time` so that `channel` reaches `value`: a peak between two steps. One that is lower than what is there, as that
+    /// of one place of a joint that touches at several, changes nothing.
+    pub fn raise(&mut self, time: f64, channel: usize, value: f64) {
         if channel >= self.channels || !time.is_finite() || !value.is_finite() {
             return;
         }
@@ -248,7 +249,7 @@ impl History {
             let index = self.index(level, time);
             if self.slots.get(level, index).0 == index {
                 let range = &mut self.slots.get_mut(level, index).1[channel];
-                *range = join(*range, (stored, stored));
+                *range = join(*range, (stored.max(range.0), stored));
             }
         }
     }
@@ -480,7 +481,7 @@ mod tests {
         for n in 0..1000 {
             history.push(f64::from(n) * 1e-4, &[1.0, 2.0]);
         }
-        history.widen(0.05, 0, 9.0);
+        history.raise(0.05, 0, 9.0);
         for most in [50, 500] {
             let range = bins(&history, 0, 0.0, 0.1, most);
             let peak = range.iter().find(|b| b.greatest == 9.0);
@@ -504,7 +505,7 @@ mod tests {
         let mark = history.mark();
         let (before, rows) = (bins(&history, 0, 0.0, 1.0, 700), history.rows(70));
         push(&mut history, 3_333, 60_000);
-        history.widen(0.033_32, 0, 9.0);
+        history.raise(0.033_32, 0, 9.0);
         assert!(history.rows(70) != rows);
         history.rewind(&mark);
         assert_eq!(history.span(), Some((0.0, 3_332.0 * 1e-5)));

@@ -756,12 +756,14 @@ impl Player {
         self.record.values.extend(joints.map(|joint| joint.clearance));
         self.record.channels.read_picked(&frame, &mut self.record.values);
         for (joint, peak) in self.record.upcoming_peaks.iter().enumerate() {
-            // The peak comes from the cubic of the step, not from the interpolated state.
+            // The peak comes from the cubic of the step, not from the interpolated state. It is that of one place, the row the sum of all.
             if peak.normal > 0.0
                 && peak.time == time
                 && let Some(channel) = self.record.channels.normal_force(joint)
             {
-                self.record.values[channel] = peak.normal;
+                let several = !self.simulation.machine().loose_joints[joint].kind.site_names().is_empty();
+                let value = &mut self.record.values[channel];
+                *value = if several { value.max(peak.normal) } else { peak.normal };
             }
         }
         self.record.recorded_to = time;
@@ -799,7 +801,7 @@ impl Player {
                 && let Some(channel) = self.record.channels.normal_force(joint)
             {
                 for record in std::iter::once(&mut self.record.history).chain(self.record.detailed.as_deref_mut()) {
-                    record.widen(peak.time, channel, peak.normal);
+                    record.raise(peak.time, channel, peak.normal);
                 }
             }
             let passed = &mut self.record.passed_peaks[joint];

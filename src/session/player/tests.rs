@@ -28,6 +28,18 @@ fn the_record_holds_the_peak_of_an_impact_between_steps() {
 }
 
 #[test]
+fn the_record_of_a_joint_that_touches_at_two_places_is_the_sum_of_both() {
+    // At rest each corner carries half of the weight.
+    let mut player = player("belt");
+    player.run_to(0.6);
+    player.advance(0.0);
+    let channel = player.channels().list().iter().position(|c| c.quantity == Quantity::NormalForce).expect("recorded");
+    let mut bins = Vec::new();
+    player.history().bins(channel, 0.4, 0.6, 400, &mut bins);
+    assert!(bins.len() > 50 && bins.iter().all(|bin| bin.least > 9.7), "{bins:?}");
+}
+
+#[test]
 fn a_long_step_is_recorded_as_a_curve() {
     // Free fall: half an acceleration times time squared, in steps of milliseconds.
     let mut player = player("spcmm");
