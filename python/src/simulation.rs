@@ -281,8 +281,7 @@ impl PySimulation {
     /// Velocities by name of coordinate.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let positions = self.live.mechanism().positions();
-        let velocities = &self.live.state_vector()[positions..];
+        let velocities = &self.live.state_vector()[self.live.mechanism().velocity_range()];
         control::by_name(py, &self.coordinates, velocities, |own| own.velocities.clone())
     }
 
@@ -297,7 +296,10 @@ impl PySimulation {
     ) -> PyResult<()> {
         let time = time.map(|time| duration("time", time)).transpose()?.unwrap_or(self.live.time());
         let mut y = self.live.state_vector().to_vec();
-        let (positions, velocities) = y.split_at_mut(self.live.mechanism().positions());
+        let range = self.live.mechanism().velocity_range();
+        // As contacts are found anew, so are their bristles.
+        y[range.end..].fill(0.0);
+        let (positions, velocities) = y[..range.end].split_at_mut(range.start);
         let coordinates = &self.coordinates;
         control::take(("q", q), coordinates, positions, |own| own.positions.clone())?;
         control::take(("v", v), coordinates, velocities, |own| own.velocities.clone())?;

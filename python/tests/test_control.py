@@ -214,3 +214,14 @@ def test_the_right_hand_side_and_the_linearisation_agree(scene):
     squares = np.sort(np.linalg.eigvals(np.linalg.solve(simulation.mass_matrix(), stiffness)))
     assert linear.frequencies == pytest.approx(np.sqrt(squares[1:]) / (2.0 * np.pi), rel=1e-6)
     assert linear.directions.tolist() == np.eye(2).tolist()
+
+
+def test_bristles_are_no_velocities_and_begin_anew_with_a_state():
+    sim = jp.Simulation(jp.Scene.load("belt"))
+    sim.step_until("0.3 s")
+    numbers = np.concatenate([np.atleast_1d(own) for own in sim.v.values()])
+    places = np.concatenate([np.atleast_1d(own) for own in sim.q.values()])
+    bristles = sim.vector[len(places) + len(numbers) :]
+    assert len(bristles) == 12 and np.abs(bristles).max() > 0
+    sim.set_state(v=numbers, time=0.3)
+    assert np.all(sim.vector[len(places) + len(numbers) :] == 0)

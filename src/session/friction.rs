@@ -150,8 +150,11 @@ impl FrictionRecord {
             let axes = axes_of(frame, own.carrier);
             for (place, record) in own.places.iter_mut().enumerate() {
                 let PlaceRecord { points, extent } = record;
-                while points.last().is_some_and(|last| last.time > frame.time) {
-                    points.pop();
+                let kept = points.partition_point(|point| point.time <= frame.time);
+                if kept < points.len() {
+                    points.truncate(kept);
+                    let latest = points.iter().rev().take_while(|point| point.presses);
+                    *extent = latest.map(|point| distance(point.displacement, [0.0; 2])).fold(0.0, f64::max);
                 }
                 let last = points.last();
                 if last.is_some_and(|last| last.time == frame.time) {

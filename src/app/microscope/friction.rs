@@ -8,6 +8,7 @@ use crate::app::friction::{Contact, Point};
 use crate::app::overlay::colour;
 use crate::app::player::Player;
 use crate::app::value;
+use crate::contact::FrictionVelocity;
 use crate::contact::{FrictionLaw, Parameters};
 
 /// Height where there is room, and least height, points.
@@ -169,11 +170,18 @@ pub fn diagram(
         sheet.words(pos2(rect.right() - 8.0, rect.top() + 5.0), Align2::RIGHT_TOP, &limit, limit_colour);
     }
     let [part, wall] = magnified.kind.parts();
+    let contact = player.running().machine.loose_joints.get(joint).map(|joint| joint.contact);
+    // With the velocity of the centres, the law does not see how the surfaces slide.
+    let of_centres = contact.is_some_and(|contact| contact.friction_velocity == FrictionVelocity::Centres);
+    let [what, area] = if of_centres {
+        ["centres", ""]
+    } else {
+        ["surfaces", " The area of a closed loop is the energy that friction takes."]
+    };
     let help = format!(
-        "Friction force of the {part} on the {wall} over the displacement of their surfaces since the contact began, both along the main \
-         direction of sliding on the wall; the last {} of the contact at most. The orange lines are the limit of friction, + and - μ N. The area of a \
-         closed loop is the energy that friction takes. Bristles bend before they slide, and friction rises and falls along a \
-         slope; the modified Coulomb law depends on the sliding speed alone, and friction jumps where the sliding reverses.",
+        "Friction force of the {part} on the {wall} over the displacement of their {what} since the contact began, both along the main \
+         direction of sliding on the wall; the last {} of the contact at most. The orange lines are the limit of friction, + and - μ N.{area} \
+         Bristles bend before they slide, and friction rises and falls along a slope; the modified Coulomb law depends on the sliding speed alone, and friction jumps where the sliding reverses.",
         value::time(player.automatic_window())
     );
     response.on_hover_text(help);

@@ -578,11 +578,15 @@ impl Mechanism {
         self.contacts.contact(c).bristle_excess(bristles, self.motion(), contact_state, branch)
     }
 
-    /// Straightens the bristles of contacts that have ended.
-    pub(crate) fn release_bristles(&self, y: &mut [f64], contact_states: &[ContactState]) {
-        if self.contacts.bristles() > 0 {
-            let ended = contact_states.iter().enumerate().filter(|(_, contact_state)| !contact_state.active);
-            ended.filter_map(|(c, _)| self.bristles_of(c)).for_each(|of| y[of].fill(0.0));
+    /// Straightens the bristles of contacts that have ended in the state `y` with the derivative `k`.
+    pub(crate) fn release_bristles(&self, [y, k]: [&mut [f64]; 2], contact_states: &[ContactState]) {
+        if self.contacts.bristles() == 0 {
+            return;
+        }
+        let ended = contact_states.iter().enumerate().filter(|(_, contact_state)| !contact_state.active);
+        for of in ended.filter_map(|(c, _)| self.bristles_of(c)) {
+            y[of.clone()].fill(0.0);
+            k[of].fill(0.0);
         }
     }
 

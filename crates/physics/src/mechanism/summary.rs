@@ -54,7 +54,7 @@ impl Summary {
             degrees_of_freedom: velocity_coordinates.saturating_sub(rank),
             ideal_joints: model.ideal_joints.len(),
             closing_joints: model.closures.len(),
-            frictional_contacts: mechanism.contacts.iter().filter(|contact| contact.law.friction > 0.0).count(),
+            frictional_contacts: mechanism.contacts.iter().filter(|contact| contact.law.has_friction()).count(),
             contacts: mechanism.contacts.len(),
             single_body_blocks: model.blocks.iter().filter(|b| b.single_free_body.is_some()).count(),
             largest_implicit: mechanism.largest_implicit(),

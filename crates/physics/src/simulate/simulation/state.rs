@@ -47,6 +47,11 @@ impl StepEnd {
         }
     }
 
+    /// As [`Mechanism::release_bristles`].
+    pub(super) fn release_bristles(&mut self, mechanism: &Mechanism) {
+        mechanism.release_bristles([&mut self.y, &mut self.k], &self.contact_states);
+    }
+
     /// The step of size `h` that begins here.
     pub(super) fn step(&self, h: f64) -> Step<'_> {
         Step { t: self.t, h, y: &self.y, k: &self.k }
@@ -286,7 +291,7 @@ impl State {
             && self.elements.fits(model.machine())
             && model.machine().with_conditions(conditions, &self.elements).check().is_ok()
             && self.joints.iter().map(|joint| joint.contacts).eq(own.joints.iter().map(|joint| joint.contacts))
-            && self.joints.iter().flat_map(|joint| joint.worn).all(|worn| worn.depth >= 0.0)
+            && self.joints.iter().flat_map(|joint| joint.worn).all(|worn| worn.depth >= 0.0 && worn.depth.is_finite() && worn.rate.is_finite())
             && self.contacts.len() == contacts
             && self.flights.len() == own.flights.len()
             // Only a window has a hand.

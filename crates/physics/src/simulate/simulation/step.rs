@@ -66,7 +66,6 @@ impl Stepping<'_> {
     /// Completes the start: contacts, derivative, first peaks, ledger.
     pub(super) fn begin(&mut self) -> Result<(), StartError> {
         self.begin_contacts_at_start();
-        self.mechanism.release_bristles(&mut self.state.now.y, &self.state.now.contact_states);
         self.choose_first_scheme();
         self.refresh();
         self.state.record.determinant_positive = self.mechanism.is_determinant_positive();
@@ -117,6 +116,7 @@ impl Stepping<'_> {
         let located = self.locates();
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
+        now.release_bristles(mechanism);
         let active_set = ActiveSet::by(located, &now.contact_states);
         let mut evaluator = mechanism.evaluator(active_set);
         evaluator.derivative(now.t, &now.y, &mut now.k);
@@ -306,7 +306,7 @@ impl Stepping<'_> {
         self.find_peak_forces(h);
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
-        self.mechanism.release_bristles(&mut self.state.now.y, &self.state.now.contact_states);
+        self.state.now.release_bristles(self.mechanism);
         let again = (mean_rates && self.mechanism.has_reactions()) || (!mean_rates && switched.forces);
         if !again && !located {
             self.track_reactions();

@@ -117,6 +117,7 @@ impl Stepping<'_> {
                 state.record.impacts.change(c, false, t, &mut attempt.events);
             }
         }
+        now.release_bristles(mechanism);
         if state.record.account.on {
             let energies = energies(mechanism, state);
             state.record.account.record_moved_clearances(energies);
