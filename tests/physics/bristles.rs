@@ -303,6 +303,45 @@ fn the_law_changes_at_a_reset_and_its_numbers_at_once() {
     }
 }
 
+/// A long arm hangs on a loose pin that sticks, and so rolls in its bearing: about c / r times the friction angle to each side.
+#[test]
+fn a_pin_that_sticks_rolls_in_its_bearing() {
+    let text = r#"
+        [gravity]
+        z = "-9.81 m/s^2"
+        [contact]
+        friction_law = "bristle"
+        friction = 0.5
+        [solver]
+        method = "radau5"
+        [[body]]
+        name = "arm"
+        mass = "1 kg"
+        inertia = "1e-2 1e-2 1e-2 kg m^2"
+        [[joint]]
+        name = "J"
+        kind = "revolute"
+        child = "arm"
+        axis = [0, 1, 0]
+        child_point = "0 0 1 m"
+        start = { position = "0.6 deg" }
+        play = { radial = "0.1 mm", length = "20 mm", radius = "10 mm", planar = true }
+        "#;
+    let mut run = run(text, &[]);
+    run_until(&mut run, 15.0);
+    let lost = frame_now(&mut run).ledger.expect("on").friction_loss;
+    let mut swing = 0.0_f64;
+    for n in 0..50 {
+        run_until(&mut run, 15.0 + 0.1 * f64::from(n));
+        swing = swing.max(frame_now(&mut run).bodies[0].position.x.abs());
+    }
+    let more = frame_now(&mut run).ledger.expect("on").friction_loss - lost;
+    let expected = 0.1e-3 / 10e-3 * 0.5_f64.atan();
+    println!("{swing:e} {expected:e}, lost {more:e} J");
+    assert!((swing / expected - 1.0).abs() < 0.1, "{swing:e} rad, expected about {expected:e}");
+    assert!(more < 0.01 * 9.81 * swing * swing / 2.0, "{more:e} J");
+}
+
 /// It swings along its guide on its bristles: two at the corners that press, and their damping.
 #[test]
 fn what_sticks_is_linearised_with_its_stiffness() {

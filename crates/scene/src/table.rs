@@ -211,7 +211,7 @@ static TABLE: [Parameter; 30] = [
         number(D::None, 1.0, 10.0, "", (1.0, 3.0)),
         "Coefficient of friction at rest over that of sliding, for the friction law bristle. Above 1, slow motions \
          jerk: the contact sticks until the load breaks it away.",
-        "Dupont et al. (2002), eq. 9",
+        "Stribeck (1902); Dupont et al. (2002)",
     ),
     contact_number!(
         stribeck_speed,
@@ -219,7 +219,7 @@ static TABLE: [Parameter; 30] = [
         logarithmic(D::Speed, 1e-6, 10.0, "mm/s", (1e-5, 0.1)),
         "v_s of the friction law bristle: at this sliding speed friction has fallen 63 % of the way from its static to \
          its sliding value. Without effect at a static friction ratio of 1.",
-        "Dupont et al. (2002), eq. 9",
+        "Stribeck (1902); Dupont et al. (2002)",
     ),
     contact_number!(
         bristle_stiffness,

@@ -365,7 +365,6 @@ impl Contacts {
     }
 
     /// Sets the rates of all bristles to those without contact.
-    #[cold]
     #[inline(never)]
     fn straighten_bristles(&mut self) {
         for state in self.contacts.iter_mut().filter_map(|contact| contact.bristles.as_mut()) {

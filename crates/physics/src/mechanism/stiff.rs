@@ -24,7 +24,7 @@ use std::ops::Range;
 /// Bristles of a contact, linearised: G = -(1 - turning) / lag across `along`, and -1 / lag along it; B = turning times the sliding velocity
 /// across it.
 #[derive(Clone)]
-struct Bristles {
+struct LinearBristles {
     /// Its part of [`Stiff::slips`].
     slips: Range<usize>,
     /// That of the carrier.
@@ -34,7 +34,7 @@ struct Bristles {
     lag: f64,
 }
 
-impl Bristles {
+impl LinearBristles {
     /// Of a contact that carries no force.
     const FREE: Self = Self {
         slips: 0..0,
@@ -106,7 +106,7 @@ pub struct Stiff {
     positions: usize,
     first_bristle: usize,
     /// By three components, and the sliding velocity of their contacts per unit rate of each coordinate.
-    bristles: Vec<Bristles>,
+    bristles: Vec<LinearBristles>,
     slips: Vec<(usize, Vec3)>,
     bristle_scratch: [Vec<f64>; 2],
     /// Whether no contact or element carries a force: J is then zero except for q' = T v.
@@ -151,7 +151,7 @@ impl Stiff {
             moved: Vec::with_capacity(n),
             positions,
             first_bristle: positions + velocities,
-            bristles: vec![Bristles::FREE; bristles / 3],
+            bristles: vec![LinearBristles::FREE; bristles / 3],
             slips: Vec::with_capacity(n * bristles / 3),
             bristle_scratch: [vec![0.0; bristles], vec![0.0; bristles]],
             empty: true,
@@ -178,7 +178,7 @@ impl Stiff {
         self.empty = true;
         let at = At { t, motion, active_set, bristles: &y[self.first_bristle..] };
         self.slips.clear();
-        self.bristles.fill(Bristles::FREE);
+        self.bristles.fill(LinearBristles::FREE);
         let of_contacts = contacts.iter().map(|contact| contact.coupling(&at));
         let of_elements = elements.iter().map(|element| element.coupling(&at));
         for coupling in of_contacts.chain(of_elements).flatten() {
@@ -272,7 +272,7 @@ impl Stiff {
             let slip = if coupling.uses_surface_velocity { column.surface } else { column.centre };
             (column.coordinate, slip - n * n.dot(&slip))
         }));
-        let bristles = Bristles {
+        let bristles = LinearBristles {
             slips: first..self.slips.len(),
             rotation: at.motion[contact.site.carrier.body].rotation,
             along: force.along,
