@@ -2,7 +2,7 @@
 
 use super::field::{Access, Field, FieldValue, SWITCH, field, word_field, word_of};
 use super::{Formulation, Kind, Machine, Parameter, Preset, Scope, SignedAxis, StartRule, Value, play};
-use jointplay_physics::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
+use jointplay_physics::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw, WearShape};
 use jointplay_physics::integrate::Method;
 use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
@@ -92,7 +92,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 30] = [
+static TABLE: [Parameter; 31] = [
     contact_number!(
         clearance,
         "Clearance",
@@ -243,7 +243,16 @@ static TABLE: [Parameter; 30] = [
         "Wear coefficient",
         logarithmic(D::Wear, 0.0, 1e-6, "m^2/N", (1e-18, 1e-8)),
         "Volume that a contact removes per normal force and sliding distance; the play grows by that volume over the \
-         area of its surfaces, evenly. With 0 nothing wears. 1 mm^3/(N m) is 1e-9 m^2/N.",
+         area of its surfaces. With 0 nothing wears. 1 mm^3/(N m) is 1e-9 m^2/N.",
+        "Archard (1953); Flores (2009)",
+    ),
+    contact_choice!(
+        wear_shape,
+        "Wear shape",
+        WearShape,
+        "What a contact wears off. even takes it off the whole surface that the play is between, so that a ball and a \
+         bearing stay round; profile takes it off the wall of the socket or the bearing where it is touched. Collars and the \
+         walls of a guide wear evenly in any case. A change acts at the next reset.",
         "Archard (1953); Flores (2009)",
     ),
     gravity(

@@ -80,6 +80,20 @@ words!(FrictionVelocity {
     Surface => "surface",
 });
 
+/// Where a contact takes off what it wears.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
+pub enum WearShape {
+    /// Of the whole surface that the play is between, evenly.
+    Even,
+    /// Of the wall of a socket or a bearing where it is touched; of other surfaces evenly.
+    Profile,
+}
+
+words!(WearShape {
+    Even => "even",
+    Profile => "profile",
+});
+
 /// Approach speed by which the damping term of the normal force divides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub enum ApproachSpeed {
@@ -161,6 +175,8 @@ pub struct Parameters {
     pub friction_law: FrictionLaw,
     /// Worn volume by normal force and sliding distance, m^2/N (Archard); 0: nothing wears.
     pub wear_coefficient: f64,
+    /// Where that volume is taken off.
+    pub wear_shape: WearShape,
 }
 
 impl Parameters {
@@ -174,10 +190,15 @@ impl Parameters {
         self.friction_law == FrictionLaw::Bristle && !self.is_ideal()
     }
 
-    /// What determines the equations that the joint adds: whether it has each play, and bristles.
-    pub(crate) fn structure(&self) -> [bool; 3] {
+    /// Whether its round walls wear by direction, so that their profiles are part of the state.
+    pub(crate) fn has_profile(&self) -> bool {
+        self.wear_shape == WearShape::Profile && self.clearance > 0.0
+    }
+
+    /// What determines the equations that the joint adds, and its state: whether it has each play, bristles, and profiles.
+    pub(crate) fn structure(&self) -> [bool; 4] {
         let [first, second] = self.clearances().map(|play| play > 0.0);
-        [first, second, self.has_bristles()]
+        [first, second, self.has_bristles(), self.has_profile()]
     }
 
     /// Whether the joint has no play.
@@ -212,6 +233,7 @@ impl Parameters {
         normal_law: NormalLaw::LankaraniNikravesh,
         friction_law: FrictionLaw::ModifiedCoulomb,
         wear_coefficient: 0.0,
+        wear_shape: WearShape::Even,
     };
 }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::elements::{ActiveSet, At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
+use super::loose::{Bumps, Profile};
 use super::model::{ContactId, Model, Site};
 use crate::contact::{Coefficients, Parameters};
 use crate::machine::{LooseKind, Machine, Vec3, root};
@@ -99,6 +100,8 @@ pub struct Contacts {
     moves: bool,
     /// Some joint has a wear coefficient.
     wears: bool,
+    /// Some wall wears by direction.
+    has_profiles: bool,
     /// Contacts of the same group act on one another.
     groups: Vec<usize>,
     /// Evaluations skip contacts that do not touch, because some of their bodies are suspended.
@@ -140,10 +143,15 @@ impl Contacts {
             let first_bristle = parameters.has_bristles().then_some(bristles);
             bristles += 3 * usize::from(first_bristle.is_some());
             let law = site.stiffness.coefficients(parameters, parameters.clearances()[site.play]);
-            Contact::new(id, site, law, first_bristle)
+            let mut contact = Contact::new(id, site, law, first_bristle);
+            let bumps = Bumps::of(&machine.loose_joints[site.joint], &site);
+            contact.profile = bumps.map(|bumps| Box::new(Profile::new(site, bumps)));
+            contact
         });
+        let contacts: Vec<Contact> = contacts.collect();
         Self {
-            contacts: contacts.collect(),
+            has_profiles: contacts.iter().any(|contact| contact.profile.is_some()),
+            contacts,
             bristles,
             joints: joints.collect(),
             groups: groups(machine, model),
@@ -299,9 +307,28 @@ impl Contacts {
         self.wears
     }
 
-    /// By how much play `play` of joint `j` has worn wider at `t`, within the latest step or at its end, m.
+    /// By how much play `play` of joint `j` has worn wider at `t`, within the latest step or at its end, m; the mean over its walls.
     pub(crate) fn worn(&self, j: usize, play: usize, t: f64) -> f64 {
-        self.joints[j].wearing.at(play, t).0
+        self.joints[j].wearing.at(play, t).0 + self.mean_profile(j, play)
+    }
+
+    /// Mean depth of the profiles of play `play` of joint `j` at the time of the latest evaluation, m.
+    fn mean_profile(&self, j: usize, play: usize) -> f64 {
+        if !self.has_profiles {
+            return 0.0;
+        }
+        let profiles = || self.of_play(j, play).filter_map(|c| self.contacts[c].profile.as_ref());
+        profiles().map(|profile| profile.mean_depth()).sum::<f64>() / profiles().count().max(1) as f64
+    }
+
+    /// The worn wall of contact `c`, if it wears by direction.
+    pub(crate) fn profile(&self, c: ContactId) -> Option<&Profile> {
+        self.contacts[c].profile.as_deref()
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn profile_mut(&mut self, c: ContactId) -> Option<&mut Profile> {
+        self.contacts[c].profile.as_deref_mut()
     }
 
     /// Continues the wear of joint `j` with `worn` from `t` on, the end of a step; within the step the clearance stays as it was.
@@ -327,6 +354,15 @@ impl Contacts {
         if self.moves {
             self.follow_moves(t);
         }
+        if self.has_profiles {
+            self.choose_profiles(t);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn choose_profiles(&mut self, t: f64) {
+        self.contacts.iter_mut().filter_map(|contact| contact.profile.as_mut()).for_each(|profile| profile.choose(t));
     }
 
     #[cold]
@@ -354,6 +390,9 @@ impl Contacts {
             return;
         }
         self.move_clearances(at.t);
+        if self.has_profiles {
+            self.contacts.iter_mut().for_each(|contact| contact.follow_wear(at.motion));
+        }
         loads.counts.contacts += 1;
         for contact in &mut self.contacts {
             if self.skips_inactive && !contact.may_carry_force(at.active_set) {

@@ -325,13 +325,13 @@ impl DiscreteGradient {
         for row in &mut self.rows {
             let columns = &mut self.columns[row.index];
             if let Law::Contact(law) = &row.law {
-                let (site, n) = (&model.sites[row.index], row.normal);
-                let motion = equations.motion();
-                row.step.bent = contacts.contact(row.index).bent(bristles, &n, motion);
+                let (contact, n) = (contacts.contact(row.index), row.normal);
+                let (site, motion) = (&contact.site, equations.motion());
+                row.step.bent = contact.bent(bristles, &n, motion);
                 let spins = [site.carried.body, site.carrier.body].map(|body| &motion[body].angular_velocity);
-                // Along a bore or a plane the centres move without a change of e.
+                // Along a bore or a plane the centres move without a change of e, and a worn wall is touched elsewhere at the end.
                 let relative = |site: &Site| site.opening(motion, &site.arms(motion)).1;
-                let mean = if site.wall == Wall::Socket { row.guessed[0] } else { relative(site) };
+                let mean = if contact.moves_as_measured() { row.guessed[0] } else { relative(site) };
                 let distance = if site.wall == Wall::Socket { 0.0 } else { row.step.mean_distance(&row.guessed[0]) };
                 let levers = site.wall.levers(law, distance);
                 row.guessed[1] = law.slip_velocity(&n, &mean, spins, levers);
@@ -778,7 +778,7 @@ impl Evaluator<'_> {
                 let Some((contact, law)) = row.contact() else {
                     continue;
                 };
-                let site = &model.sites[contact];
+                let site = &contacts.contact(contact).site;
                 let [arm_ball, arm_socket] = site.arms(motion);
                 // Only friction has a lever arm about the centres.
                 let n = row.law_force.normal;

@@ -10,6 +10,7 @@ mod ledger;
 mod load_peaks;
 mod peaks;
 mod report;
+mod shared;
 mod simulation;
 mod stepper;
 mod stopped;

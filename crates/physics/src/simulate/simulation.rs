@@ -31,6 +31,7 @@ use std::sync::Arc;
 use super::impacts::{ImpactEvents, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
+use super::shared::Shared;
 use super::stepper::{ActiveScheme, AnyStepper};
 use super::{
     Doubt, Effect, Frame, Impact, ImpactEvent, Indeterminate, Ledger, LoadPeaks, Peak, StartError, Statistics, Stopped,
@@ -117,6 +118,9 @@ pub struct State {
     /// What each loose joint remembers, and each contact.
     joints: Vec<JointState>,
     contacts: Vec<ContactMemory>,
+    /// Of each contact whose wall wears by direction, the depths of its profile, m; empty for others. Copies of the state share those
+    /// that have not changed since.
+    profiles: Vec<Shared<f64>>,
     /// The hand's pull, if any.
     pull: Option<Pull>,
     /// Flights of the bodies excluded from the latest step, indexed like the mechanism's free-flight bodies.
@@ -286,6 +290,8 @@ struct Attempt {
     is_near_peak: bool,
     /// Wear of each play of each joint over the step: at its quadrature nodes, then its growth, m, and the rate at its end, m/s.
     wearing: Vec<wear::Growth>,
+    /// The same of each contact whose wall wears by direction.
+    abrasion: Vec<wear::Abrasion>,
     /// Largest normal force of each contact, N, and the fraction of the step at which it occurs.
     peak_forces: Vec<(f64, f64)>,
     /// [`StepStart::rebounds`](crate::mechanism::StepStart::rebounds) of a discrete-gradient step.

@@ -4,7 +4,7 @@ use super::{ActiveSet, At, Coupling, ForceElement, Loads};
 use crate::contact::{BristleForce, Coefficients, ContactState, Force, FrictionBranch, Separation};
 use crate::machine::Vec3;
 use crate::mechanism::kinematics::Kinematics;
-use crate::mechanism::loose::{Spot, Wall};
+use crate::mechanism::loose::{Profile, Spot, Wall};
 use crate::mechanism::model::{Anchor, ContactId, Site};
 use crate::mechanism::{Powers, WallContact};
 
@@ -34,6 +34,8 @@ pub struct Contact {
     pub gap: Gap,
     /// Its bristles, if its law of friction has them.
     pub bristles: Option<BristleState>,
+    /// Its worn wall, if that wears by direction; `site` then follows it.
+    pub profile: Option<Box<Profile>>,
 }
 
 /// The bristles of a contact, in axes fixed to the carrier.
@@ -49,7 +51,7 @@ impl Contact {
     /// `first_bristle`: place of its bristles among those of all contacts, if it has any.
     pub fn new(id: ContactId, site: Site, law: Coefficients, first_bristle: Option<usize>) -> Self {
         let bristles = first_bristle.map(|first| BristleState { first, ..BristleState::default() });
-        Self { id, site, law, gap: Gap::default(), bristles }
+        Self { id, site, law, gap: Gap::default(), bristles, profile: None }
     }
 
     /// Deflection of its bristles, m, in world axes and the plane across `normal`; zero without bristles.
@@ -114,6 +116,11 @@ impl Contact {
         self.bristle_friction(at.bristles, at.motion, branch, self.gap.normal_force).map(|(force, ..)| force)
     }
 
+    /// Whether the change of the eccentricity over a step is the motion of its ends.
+    pub fn moves_as_measured(&self) -> bool {
+        self.site.wall == Wall::Socket && self.profile.is_none()
+    }
+
     /// Rate of the normal relative to the carrier, 1/s.
     fn normal_rate(&self, motion: &[Kinematics]) -> Vec3 {
         let (gap, carrier) = (&self.gap, &motion[self.site.carrier.body]);
@@ -122,8 +129,19 @@ impl Contact {
             return Vec3::zeros();
         }
         let velocity = gap.eccentricity_rate - carrier.angular_velocity.cross(&gap.eccentricity);
+        if let Some(profile) = &self.profile {
+            return profile.normal_by_displacement(motion) * velocity;
+        }
         let across = self.site.wall.confined(&carrier.rotation) * velocity;
         (across - normal * normal.dot(&across)) / distance
+    }
+
+    /// Lets the site follow the worn wall, if there is one.
+    #[inline(never)]
+    pub fn follow_wear(&mut self, motion: &[Kinematics]) {
+        if let Some(profile) = &mut self.profile {
+            profile.follow(&mut self.site, motion);
+        }
     }
 
     /// Whether it may carry a force.
@@ -200,6 +218,7 @@ impl Contact {
 
     /// Measures the eccentricity and its rate; forces are left unchanged.
     pub fn measure(&mut self, motion: &[Kinematics]) {
+        self.follow_wear(motion);
         let site = &self.site;
         let (e, rate) = site.opening(motion, &site.arms(motion));
         (self.gap.eccentricity, self.gap.eccentricity_rate) = (e, rate);
@@ -291,7 +310,11 @@ impl ForceElement for Contact {
         let read = self.slip_velocity(&n, at.motion);
         let force = Force { normal: gap.normal_force, friction: gap.friction, slip_speed: gap.slip_speed };
         let Self { site, law, .. } = self;
-        let confined = site.wall.confined(&at.motion[site.carrier.body].rotation);
+        let confined = match &self.profile {
+            None => site.wall.confined(&at.motion[site.carrier.body].rotation),
+            // The normal turns by the curvature of the worn wall.
+            Some(profile) => profile.normal_by_displacement(at.motion) * gap.separation.distance + n * n.transpose(),
+        };
         let mut stiffness =
             law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force, &confined);
         let distance = gap.separation.distance;

@@ -4,12 +4,14 @@ mod ball;
 mod division;
 mod implied;
 mod pin;
+mod profile;
 mod slide;
 mod sphere;
 mod wall;
 
 pub use division::{Division, Edges, Part, Shape, Spot};
 pub use implied::drop_implied;
+pub use profile::{Bumps, Profile};
 pub use sphere::Grid;
 pub use wall::{Edge, Stiffness, Wall};
 

@@ -1,6 +1,5 @@
 //! Energy ledger of a running simulation, from powers at a few instants of each accepted step.
 
-use super::wear::{Growth, integrate_rates, record_rates};
 use super::{Record, State, Stepping};
 use crate::integrate::Method;
 use crate::mechanism::{ActiveSet, Mechanism, Powers};
@@ -44,7 +43,7 @@ impl Stepping<'_> {
             return;
         }
         if wears {
-            self.attempt.wearing.fill(Growth::default());
+            self.attempt.clear_wear();
         }
         let located = self.locates();
         let Self { mechanism, state, before, scratch_k, .. } = self;
@@ -80,7 +79,7 @@ impl Stepping<'_> {
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
             let instants = self.stepper.quadrature();
-            record_rates(&mut self.attempt.wearing, instants.len() - 1, self.mechanism);
+            self.attempt.record_rates(instants.len() - 1, self.mechanism);
             if self.state.record.wear.is_some() {
                 let active_set = ActiveSet::by(located, &self.before.contact_states);
                 self.mechanism.complete_gaps(active_set, &self.state.now.y);
@@ -97,7 +96,7 @@ impl Stepping<'_> {
             account.powers = (!switched).then_some(end);
             if wears || wear.is_some() {
                 let weights = &weights(instants, 1.0)[..instants.len()];
-                integrate_rates(&mut self.attempt.wearing, h, weights);
+                self.attempt.integrate_rates(h, weights);
                 if let Some(wear) = wear {
                     wear.integrate_step(h, weights);
                 }
@@ -168,7 +167,7 @@ impl Stepping<'_> {
         let powers = evaluator.powers(before.t + theta * h, scratch_y, scratch_k);
         // No quadrature node in a kinematic scene: nothing is in contact there.
         let instant = stepper.quadrature().iter().position(|at| *at == theta).unwrap_or(0);
-        record_rates(&mut attempt.wearing, instant, mechanism);
+        attempt.record_rates(instant, mechanism);
         if let Some(wear) = &mut state.record.wear {
             wear.record_forces(instant, mechanism);
         }

@@ -203,7 +203,7 @@ impl Stepping<'_> {
     fn change_play(&mut self, j: usize, play: usize, next: f64) {
         let Self { mechanism, state, attempt, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
-        let (set, worn) = (state.plays_without_wear(j)[play], state.worn(j)[play]);
+        let (set, worn) = (state.plays_without_wear(j)[play], state.worn_evenly(j)[play]);
         let now = mechanism.contacts.play(j, play);
         let distance = |c: ContactId| mechanism.contacts.gap(c).separation.penetration + now;
         let farthest = mechanism.contacts.of_play(j, play).map(distance).fold(0.0, f64::max);

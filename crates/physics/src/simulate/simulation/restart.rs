@@ -114,6 +114,7 @@ impl Simulation {
             joint.plays = contact.clearances();
             joint.worn = before.worn.map(|worn| Worn { rate: 0.0, ..worn });
         }
+        state.profiles = self.state.profiles.clone();
         self.state = state;
         self.workspace.attach_to(&self.model, &mut self.state);
         let mechanism = &mut self.workspace.mechanism;

@@ -12,6 +12,7 @@ use crate::mechanism::{ContactId, Flight, Mechanism, Pull, Worn};
 use crate::simulate::impacts::{ForcePeak, Impact, Impacts};
 use crate::simulate::ledger::{Account, Ledger};
 use crate::simulate::peaks::{Approach, Recent};
+use crate::simulate::shared::Shared;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
 use crate::simulate::{Peak, Statistics, Wear};
 
@@ -27,6 +28,11 @@ impl JointState {
             peak: Peak::default(),
         }
     }
+}
+
+/// Depths of the profile of contact `c` at the start; none if it has none.
+fn unworn(mechanism: &Mechanism, c: ContactId) -> Shared<f64> {
+    vec![0.0; mechanism.contacts.profile(c).map_or(0, |profile| profile.bumps().len())].into()
 }
 
 impl ContactMemory {
@@ -84,6 +90,7 @@ impl State {
             quarter_turns,
             joints: (0..joints).map(|j| JointState::new(mechanism, j)).collect(),
             contacts: (0..contacts).map(|c| ContactMemory::new(mechanism, c)).collect(),
+            profiles: (0..contacts).map(|c| unworn(mechanism, c)).collect(),
             elements: LiveElements::default(),
             pull: None,
             flights: vec![None; mechanism.free_flight_bodies().len()],
@@ -163,9 +170,32 @@ impl State {
         [0, 1].map(|play| ramps[play].map_or(plays[play], |ramp| ramp.at(self.now.t).0))
     }
 
-    /// How far each play of loose joint `j` has worn wider since the start, m.
+    /// How far each play of loose joint `j` has worn wider since the start, m; where it wears by direction, the mean over its walls.
     pub fn worn(&self, j: usize) -> [f64; 2] {
+        let [first, second] = self.worn_evenly(j);
+        [first + self.mean_profile(j), second]
+    }
+
+    /// The same without what wears by direction.
+    pub(super) fn worn_evenly(&self, j: usize) -> [f64; 2] {
         self.joints[j].worn.map(|worn| worn.depth)
+    }
+
+    /// Worn depths of the round walls of loose joint `j` that wear by direction, by the bumps of their profiles: one wall of a ball, one or two of a
+    /// pin.
+    pub(super) fn profiles(&self, j: usize) -> impl Iterator<Item = &[f64]> + Clone {
+        let first: usize = self.joints[..j].iter().map(|joint| joint.contacts).sum();
+        let own = &self.profiles[first..first + self.joints[j].contacts];
+        own.iter().map(|depths| &**depths).filter(|depths| !depths.is_empty())
+    }
+
+    fn mean_profile(&self, j: usize) -> f64 {
+        let mut means = self.profiles(j).map(|depths| depths.iter().sum::<f64>() / depths.len() as f64).peekable();
+        if means.peek().is_none() {
+            return 0.0;
+        }
+        let (count, sum) = means.fold((0.0, 0.0), |(count, sum), mean| (count + 1.0, sum + mean));
+        sum / count
     }
 
     /// Volume worn off the walls of each play of loose joint `j` since the start, m^3: depth times area.
@@ -213,7 +243,7 @@ impl State {
     }
 
     /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each loose joint
-    /// whether each of its contacts touches and its approach speed (0 and 0 if it is ideal), and its current clearance, with the second, if it has one, and the worn part of each that has worn; then, of the angles that elements act on and
+    /// whether each of its contacts touches and its approach speed (0 and 0 if it is ideal), and its current clearance, with the second, if it has one, and the worn part of each that has worn, and the depths of a profile that has; then, of the angles that elements act on and
     /// coordinates do not count, the number and the quarter turns of each that has at least two. The current branch of the friction law is excluded: like the step size, it belongs to
     /// the stepper.
     pub fn hash(&self) -> u64 {
@@ -244,6 +274,9 @@ impl State {
             for worn in self.worn(j).into_iter().filter(|worn| *worn > 0.0) {
                 add(worn.to_bits());
             }
+            for depths in self.profiles(j).filter(|depths| depths.iter().any(|depth| *depth != 0.0)) {
+                depths.iter().for_each(|depth| add(depth.to_bits()));
+            }
         }
         // Closer to 0 the poses determine the angle.
         for (i, quarters) in self.quarter_turns.iter().enumerate().filter(|(_, quarters)| quarters.unsigned_abs() > 1) {
@@ -267,6 +300,7 @@ impl State {
         FIXED
             + turns
             + wear
+            + self.profiles.iter().map(|depths| size_of_val(&**depths)).sum::<usize>()
             + flights
             + self.elements.bytes()
             + coordinates * COPIES * size_of::<f64>()
@@ -281,7 +315,7 @@ impl State {
         let record = &self.record;
         let worn = record.wear.as_ref();
         let conditions = &self.conditions;
-        let structure = |contacts: &Conditions| -> Vec<[bool; 3]> {
+        let structure = |contacts: &Conditions| -> Vec<[bool; 4]> {
             contacts.joints.iter().map(contact::Parameters::structure).collect()
         };
         let fits = self.now.fits(dimension, contacts)
@@ -293,6 +327,8 @@ impl State {
             && self.joints.iter().map(|joint| joint.contacts).eq(own.joints.iter().map(|joint| joint.contacts))
             && self.joints.iter().flat_map(|joint| joint.worn).all(|worn| worn.depth >= 0.0 && worn.depth.is_finite() && worn.rate.is_finite())
             && self.contacts.len() == contacts
+            && self.profiles.iter().map(|depths| depths.len()).eq(own.profiles.iter().map(|depths| depths.len()))
+            && self.profiles.iter().flat_map(|depths| depths.iter()).all(|depth| *depth >= 0.0 && depth.is_finite())
             && self.flights.len() == own.flights.len()
             // Only a window has a hand.
             && self.pull.is_none()

@@ -2,7 +2,7 @@
 
 use super::discrete::discrete_size;
 use super::flights::{clear_flights, write_flights};
-use super::wear::Growth;
+use super::wear::{Abrasion, Growth};
 use super::{
     Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, SHORTEST_KINEMATIC_STEP, State, StepEnd, Stepping, Workspace,
     store_gaps,
@@ -33,6 +33,7 @@ impl Attempt {
             may_contain_peak: false,
             is_near_peak: false,
             wearing: vec![Growth::default(); machine.loose_joints.len()],
+            abrasion: vec![Abrasion::default(); contacts],
             peak_forces: vec![(0.0, 0.0); contacts],
             rebounds: vec![None; contacts],
             stiffness: 0.0,

@@ -6,10 +6,11 @@
 //! wall at its end, and the elastic energy that this takes is work of the clearance.
 
 use super::energy::energies;
-use super::{Stepping, store_gaps};
+use super::{Attempt, Stepping, store_gaps};
 use crate::contact::ContactState;
 use crate::integrate::System as _;
-use crate::mechanism::{ActiveSet, Mechanism, Worn};
+use crate::machine::Vec3;
+use crate::mechanism::{ActiveSet, ContactId, Mechanism, Profile, Worn};
 use crate::simulate::Wear;
 
 /// Wear of the plays of a joint over a step.
@@ -23,26 +24,66 @@ pub(super) struct Growth {
     rate: [f64; 2],
 }
 
-/// Records the rates of the latest evaluation of `mechanism` at node `instant` of the step.
-pub(super) fn record_rates(wearing: &mut [Growth], instant: usize, mechanism: &Mechanism) {
-    if !mechanism.contacts.wears() {
-        return;
+/// What a contact wears off its profile at one node of a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rub {
+    /// Volume over the area of the whole wall, m/s; over the step m.
+    depth: f64,
+    /// Where, from the middle of the wall, m, in the axes of the worn body.
+    toward: Vec3,
+    /// m.
+    penetration: f64,
+}
+
+/// Wear of a profile over a step, at its quadrature nodes.
+pub(super) type Abrasion = [Rub; 3];
+
+impl Attempt {
+    /// Nothing has worn off yet.
+    pub(super) fn clear_wear(&mut self) {
+        self.wearing.fill(Growth::default());
+        self.abrasion.fill(Abrasion::default());
     }
-    for c in 0..mechanism.contacts.len() {
-        let power = mechanism.sliding_power(c);
-        if power > 0.0 {
-            let (j, play) = (mechanism.contacts.joint_of(c), mechanism.contacts.play_of(c));
-            wearing[j].nodes[instant][play] += power * mechanism.contacts.depth_by_work(j, play);
+
+    /// Records the rates of the latest evaluation of `mechanism` at node `instant` of the step.
+    pub(super) fn record_rates(&mut self, instant: usize, mechanism: &Mechanism) {
+        if !mechanism.contacts.wears() {
+            return;
+        }
+        for c in 0..mechanism.contacts.len() {
+            let power = mechanism.sliding_power(c);
+            if power > 0.0 {
+                let (j, play) = (mechanism.contacts.joint_of(c), mechanism.contacts.play_of(c));
+                let rate = power * mechanism.contacts.depth_by_work(j, play);
+                match mechanism.contacts.profile(c) {
+                    Some(profile) => self.abrasion[c][instant] = Rub::at(mechanism, c, profile, rate),
+                    None => self.wearing[j].nodes[instant][play] += rate,
+                }
+            }
+        }
+    }
+
+    /// Integrates the recorded rates over a step of size `h` with the quadrature weights `weights`.
+    pub(super) fn integrate_rates(&mut self, h: f64, weights: &[f64]) {
+        for Growth { nodes, depth, rate } in &mut self.wearing {
+            *rate = nodes[weights.len() - 1];
+            *depth = [0, 1]
+                .map(|play| h * weights.iter().zip(&*nodes).map(|(weight, node)| weight * node[play]).sum::<f64>());
+        }
+        for (rub, weight) in self.abrasion.iter_mut().flat_map(|rubs| rubs.iter_mut().zip(weights)) {
+            rub.depth *= h * weight;
         }
     }
 }
 
-/// Integrates the recorded rates over a step of size `h` with the quadrature weights `weights`.
-pub(super) fn integrate_rates(wearing: &mut [Growth], h: f64, weights: &[f64]) {
-    for Growth { nodes, depth, rate } in wearing {
-        *rate = nodes[weights.len() - 1];
-        *depth =
-            [0, 1].map(|play| h * weights.iter().zip(&*nodes).map(|(weight, node)| weight * node[play]).sum::<f64>());
+impl Rub {
+    /// Of contact `c` as last measured.
+    fn at(mechanism: &Mechanism, c: ContactId, profile: &Profile, depth: f64) -> Self {
+        // What a place loses is a share of the wall's volume: the walls of a joint share its area.
+        let places = mechanism.contacts.of_joint(mechanism.contacts.joint_of(c));
+        let walls = places.filter(|&c| mechanism.contacts.profile(c).is_some()).count();
+        let penetration = mechanism.contacts.gap(c).separation.penetration;
+        Self { depth: depth * walls as f64, toward: *profile.toward(), penetration }
     }
 }
 
@@ -66,6 +107,10 @@ impl Stepping<'_> {
         for (c, power) in self.mechanism.discrete_sliding() {
             let (j, play) = (self.mechanism.contacts.joint_of(c), self.mechanism.contacts.play_of(c));
             let rate = power * self.mechanism.contacts.depth_by_work(j, play);
+            if let Some(profile) = self.mechanism.contacts.profile(c) {
+                self.attempt.abrasion[c][0] = Rub::at(self.mechanism, c, profile, h * rate);
+                continue;
+            }
             let growth = &mut self.attempt.wearing[j];
             growth.depth[play] += h * rate;
             // What has left its wall wears it no more.
@@ -82,6 +127,20 @@ impl Stepping<'_> {
         let Self { mechanism, state, attempt, .. } = self;
         let t = state.now.t;
         let mut moved = false;
+        for (c, rubs) in attempt.abrasion.iter().enumerate() {
+            if rubs.iter().all(|rub| rub.depth == 0.0) {
+                continue;
+            }
+            moved = true;
+            let clearance = mechanism.contacts.clearance(c);
+            if let Some(profile) = mechanism.contacts.profile_mut(c) {
+                let depths = state.profiles[c].own();
+                for Rub { depth, toward, penetration } in rubs.iter().filter(|rub| rub.depth > 0.0) {
+                    profile.bumps().deposit(depths, *depth, [clearance, *penetration], toward);
+                }
+                profile.continue_from(t, depths);
+            }
+        }
         for (j, growth) in attempt.wearing.iter().enumerate() {
             let worn = &mut state.joints[j].worn;
             let rates = worn.map(|worn| worn.rate);

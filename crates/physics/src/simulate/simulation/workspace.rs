@@ -101,4 +101,9 @@ pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &
             mechanism.contacts.set_joint(j, contact, (plays, ramps), (state.now.t, worn));
         }
     }
+    for (c, depths) in state.profiles.iter().enumerate() {
+        if let Some(profile) = mechanism.contacts.profile_mut(c) {
+            profile.set(depths);
+        }
+    }
 }
