@@ -389,6 +389,7 @@ fn wear_words(map: WearMap) -> Option<(&'static str, &'static str)> {
         WearMap::Off => None,
         WearMap::Impulse => Some(("impulse", "N s/mm²")),
         WearMap::FrictionWork => Some(("size of friction work", "mJ/mm²")),
+        WearMap::Depth => Some(("depth", "µm")),
     }
 }
 

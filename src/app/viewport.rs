@@ -970,14 +970,15 @@ impl Viewport {
         ui.checkbox(&mut options.trail, "Trail of the tip").on_hover_text("Where the probe tip has been");
         ui.add_space(4.0);
         ui.label("Wear map").on_hover_text(
-            "Colours the walls of joints with play by impulse or friction work per area since the reset; balls, pins and \
-             blocks become translucent. The scale is logarithmic and follows the largest value.",
+            "Colours the walls of joints with play by impulse or friction work per area since the reset, or by what has worn off; \
+             balls, pins and blocks become translucent. The scale is logarithmic and follows the largest value.",
         );
         ui.horizontal(|ui| {
             for (map, name, help) in [
                 (WearMap::Off, "Off", "Walls as they are"),
                 (WearMap::Impulse, "Impulse", "How often and how hard: time integral of the normal force, N s/mm²"),
                 (WearMap::FrictionWork, "Friction work", "Magnitude of the friction work, mJ/mm²"),
+                (WearMap::Depth, "Depth", "Depth of what has worn off, µm; 0 without a wear coefficient"),
             ] {
                 ui.radio_value(&mut options.wear, map, name)
                     .on_hover_text(help)

@@ -390,6 +390,8 @@ pub enum WearChoice {
     Impulse,
     /// Magnitude of the friction work.
     Friction,
+    /// Depth of what has worn off.
+    Depth,
 }
 
 /// Colours of the picture.

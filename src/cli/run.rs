@@ -213,7 +213,10 @@ impl Outputs {
             if !arguments.channels.is_empty() {
                 meta.insert("channels".into(), json!(arguments.channels));
             }
-            meta.insert("contact_states".into(), json!({"0": "free", "1": "creep", "2": "slip", "3": "ideal"}));
+            meta.insert(
+                "contact_states".into(),
+                json!({"0": "free", "1": "creep", "2": "slip", "3": "ideal", "4": "stick"}),
+            );
             files.extend(file.fill(table, meta)?);
             facts.insert("out".into(), json!(path.display().to_string()));
             summary::written(text, table.rows(), "row", &path);
@@ -226,9 +229,14 @@ impl Outputs {
             summary::written(text, rows, "impact", &path);
         }
         simulation.commit_wear();
+        let mut end = Frame::default();
+        if self.wear.is_some() {
+            let time = simulation.time();
+            simulation.sample(time, &mut end);
+        }
         if let (Some(file), Some(map)) = (self.wear, simulation.wear()) {
             let path = file.path().to_owned();
-            let (rows, filled) = wear::fill(file, map, scene, meta)?;
+            let (rows, filled) = wear::fill(file, (map, &end), scene, meta)?;
             files.extend(filled);
             facts.insert("wear_out".into(), json!(path.display().to_string()));
             summary::written(text, rows, "cell", &path);

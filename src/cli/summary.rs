@@ -12,7 +12,7 @@ use crate::analysis::assembly::StartReport;
 use crate::machine::Preset;
 use crate::scene::LiveScene;
 use crate::scene::Scene;
-use crate::simulate::Impact;
+use crate::simulate::{Impact, WornWall};
 use crate::units::significant;
 use crate::words::words;
 
@@ -82,9 +82,13 @@ pub fn json(
     }
     peaks::describe(simulation, &mut summary);
     let worn: Map<String, Json> = worn_joints(simulation)
-        .map(|(joint, worn)| {
-            let [depths, volumes] = [0, 1].map(|i| worn.iter().map(|play| play[i]).collect::<Vec<_>>());
-            (joint.to_owned(), json!({"depth_m": depths, "volume_m3": volumes}))
+        .map(|Worn { joint, plays, deepest }| {
+            let [depths, volumes] = [0, 1].map(|i| plays.iter().map(|play| play[i]).collect::<Vec<_>>());
+            let mut own = json!({"depth_m": depths, "volume_m3": volumes});
+            if let Some(deepest) = deepest {
+                own["deepest_m"] = json!(deepest);
+            }
+            (joint.to_owned(), own)
         })
         .collect();
     if !worn.is_empty() {
@@ -101,15 +105,27 @@ pub fn json(
     summary
 }
 
-/// Joints that wear, and what has worn off in each of their plays so far: depth, m, and volume, m^3.
-fn worn_joints(simulation: &LiveScene) -> impl Iterator<Item = (&str, Vec<[f64; 2]>)> {
+/// What has worn off a joint so far.
+struct Worn<'a> {
+    joint: &'a str,
+    /// Of each of its plays, depth, m, and volume, m^3.
+    plays: Vec<[f64; 2]>,
+    /// Of a joint that wears by direction, the largest depth, m; that of its first play is the mean.
+    deepest: Option<f64>,
+}
+
+/// Joints that wear.
+fn worn_joints(simulation: &LiveScene) -> impl Iterator<Item = Worn<'_>> {
     let (state, joints) = (simulation.state(), &simulation.pending().machine.loose_joints);
     joints.iter().enumerate().filter_map(move |(j, joint)| {
         let contact = &state.conditions().joints[j];
         let (worn, volumes) = (state.worn(j), state.worn_volumes(simulation.machine(), j));
         let plays = (0..2).filter(|&play| contact.clearances()[play] > 0.0).map(|play| [worn[play], volumes[play]]);
+        let plays: Vec<_> = plays.collect();
+        let walls = state.worn_walls(simulation.machine(), j);
+        let deepest = walls.iter().map(WornWall::deepest).reduce(f64::max);
         let wears = contact.wear_coefficient > 0.0 || worn != [0.0; 2];
-        Some((&*joint.name, plays.collect::<Vec<_>>())).filter(|(_, plays)| wears && !plays.is_empty())
+        (wears && !plays.is_empty()).then_some(Worn { joint: &joint.name, plays, deepest })
     })
 }
 
@@ -166,11 +182,15 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
             line("  restitution", description);
         }
     }
-    for (joint, worn) in worn_joints(simulation) {
-        let plays = worn.iter().map(|&[depth, volume]| {
+    for Worn { joint, plays, deepest } in worn_joints(simulation) {
+        let plays = plays.iter().map(|&[depth, volume]| {
             format!("{} um, {} mm^3", significant(1e6 * depth, 6), significant(1e9 * volume, 6))
         });
-        line("  worn", format!("{joint}: {}", plays.collect::<Vec<_>>().join("; ")));
+        let mut words = format!("{joint}: {}", plays.collect::<Vec<_>>().join("; "));
+        if let Some(deepest) = deepest {
+            let _ = write!(words, "; the first on average, at most {} um", significant(1e6 * deepest, 6));
+        }
+        line("  worn", words);
     }
     for part in parts(simulation) {
         line(&part.label, part.description());

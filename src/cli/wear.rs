@@ -1,4 +1,4 @@
-//! `run --wear`: one row per cell of the walls of each joint with play, with its contacts, impulse and friction work.
+//! `run --wear`: one row per cell of the walls of each joint with play, with its contacts, impulse, friction work and worn depth.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -6,9 +6,9 @@ use super::Failure;
 use super::output::{RowsFile, Table};
 use crate::files::PendingFile;
 use crate::scene::Scene;
-use crate::simulate::Wear;
+use crate::simulate::{Frame, Wear};
 
-const COLUMNS: [&str; 13] = [
+const COLUMNS: [&str; 14] = [
     "joint",
     "cell",
     "polar_from_rad",
@@ -22,15 +22,17 @@ const COLUMNS: [&str; 13] = [
     "impulse_N_s_m2",
     "friction_work_J_m2",
     "site",
+    "worn_depth_m",
 ];
 
-/// Writes `map` to `file` with its provenance `meta`, under temporary names. Also returns the number of rows.
+/// Writes `map`, and the worn depths of `frame`, to `file` with its provenance `meta`, under temporary names. Also returns the number
+/// of rows.
 ///
 /// # Errors
 /// As [`RowsFile::fill`].
 pub fn fill(
     file: RowsFile,
-    map: &Wear,
+    (map, frame): (&Wear, &Frame),
     scene: &Scene,
     mut meta: Map<String, Json>,
 ) -> Result<(usize, Vec<PendingFile>), Failure> {
@@ -56,6 +58,7 @@ pub fn fill(
                 totals.impulse / part.area,
                 totals.friction_work / part.area,
                 f64::from(part.place),
+                frame.worn_depth(j, &joint.kind, map.division(j), (part, cell)),
             ]);
         }
         let grid = map.division(j).axes();

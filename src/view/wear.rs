@@ -1,6 +1,7 @@
-//! The wear map: cells of the walls of joints with play coloured by the impulse or the friction work they received.
+//! The wear map: cells of the walls of joints with play coloured by the impulse or the friction work they received, or by what has worn
+//! off. Where a wall wears by direction its cells are drawn where it is.
 
-use glam::Mat3;
+use glam::{Mat3, Vec3};
 
 use super::instances::placed;
 use super::joint;
@@ -14,14 +15,15 @@ use crate::simulate::{Cell, Wear};
 const DECADES: f32 = 3.0;
 
 impl WearMap {
-    /// Magnitude of the value of a cell per square millimetre of its `area` (m^2).
-    fn value(self, cell: &Cell, area: f64) -> f32 {
+    /// Magnitude of the value of a cell per square millimetre of its `area` (m^2); of `depth` (m), um.
+    fn value(self, cell: &Cell, area: f64, depth: impl Fn() -> f64) -> f32 {
         let value = match self {
             Self::Off => 0.0,
             // From 1/m^2 to 1/mm^2.
             Self::Impulse => cell.impulse / area * 1e-6,
             // From J/m^2 to mJ/mm^2.
             Self::FrictionWork => cell.friction_work.abs() / area * 1e-3,
+            Self::Depth => 1e6 * depth(),
         };
         value as f32
     }
@@ -70,9 +72,13 @@ impl SceneView {
         let relative = RelativeShot::of(shot);
         let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
         let joints = 0..shot.scene.machine.loose_joints.len();
+        let frame = shot.frame;
         let valued = |j: usize| {
-            let cells = wear.division(j).each().zip(wear.cells(j));
-            cells.map(move |((part, cell), totals)| (part, cell, map.value(totals, part.area)))
+            let (division, kind) = (wear.division(j), &shot.scene.machine.loose_joints[j].kind);
+            division.each().zip(wear.cells(j)).map(move |((part, cell), totals)| {
+                let depth = || frame.worn_depth(j, kind, division, (part, cell));
+                (part, cell, map.value(totals, part.area, depth))
+            })
         };
         let values = joints.clone().flat_map(|j| valued(j).map(|(.., value)| value));
         let scale = WearScale { map, largest: values.fold(0.0, f32::max) };
@@ -88,9 +94,15 @@ impl SceneView {
             let axis = |i: usize| super::to_f32(&division.row(i).transpose());
             let axes = body * Mat3::from_cols(axis(0), axis(1), axis(2));
             for (part, cell, value) in valued(j).filter(|(.., value)| *value > 0.0) {
+                let wall = frame.worn_walls.iter().find(|wall| wall.joint == j && wall.place == part.place);
+                // The wall is touched there as one about a middle moved by this.
+                let moved = wall.map_or(Vec3::ZERO, |wall| {
+                    let moved = wall.limit(&wear.division(j).direction(part, cell), 0.0);
+                    body * super::to_f32(&moved) * out.magnification
+                });
                 let surface = Material { colour: WearScale::colour(scale.position(value)), roughness: 1.0, metal: 0.0 };
                 drawn[j].cell((part, cell), &axes, |mesh, linear, at| {
-                    out.wear.push(mesh, placed(linear, at, surface));
+                    out.wear.push(mesh, placed(linear, at + moved, surface));
                 });
             }
         }

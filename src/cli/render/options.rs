@@ -104,6 +104,7 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
             None => WearMap::Off,
             Some(WearChoice::Impulse) => WearMap::Impulse,
             Some(WearChoice::Friction) => WearMap::FrictionWork,
+            Some(WearChoice::Depth) => WearMap::Depth,
         },
     })
 }

@@ -13,7 +13,8 @@ const MAX_NAME_LENGTH: usize = 120;
 
 const IDEAL: &str = "ideal";
 const MICROSCOPE: &str = "microscope.";
-const WEAR: [(&str, WearMap); 2] = [("wear-impulse", WearMap::Impulse), ("wear-friction-work", WearMap::FrictionWork)];
+const WEAR: [(&str, WearMap); 3] =
+    [("wear-impulse", WearMap::Impulse), ("wear-friction-work", WearMap::FrictionWork), ("wear-depth", WearMap::Depth)];
 
 /// A part of the scene that can be hovered or followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +37,8 @@ pub enum WearMap {
     Impulse,
     /// Work done by friction.
     FrictionWork,
+    /// Depth of what has worn off.
+    Depth,
 }
 
 /// How much of the past the plots show.

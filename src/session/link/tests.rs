@@ -95,7 +95,7 @@ impl Random {
             instruments: self.optional(|c| Instruments {
                 microscope: c.optional(|c| format!("S{}", c.below(9))),
                 ideal: c.below(2) == 0,
-                wear: [WearMap::Off, WearMap::Impulse, WearMap::FrictionWork][c.below(3) as usize],
+                wear: [WearMap::Off, WearMap::Impulse, WearMap::FrictionWork, WearMap::Depth][c.below(4) as usize],
             }),
             lesson: self.optional(|c| format!("x{}x", c.text(9)).replace('\n', " ")),
             step: self.optional(|c| 1 + c.below(40) as usize),

@@ -68,6 +68,18 @@ impl LooseKind {
         }
     }
 
+    /// The play that its place `place`, an index among [`Self::site_names`], limits: 0, or 1 for the second.
+    pub fn play_of(&self, place: u8) -> usize {
+        match self {
+            Self::Ball => 0,
+            Self::Pin(_) => usize::from(place > 1),
+            Self::Slide(_) => {
+                let name = self.site_names().get(usize::from(place));
+                usize::from(name.is_some_and(|name| name.ends_with('z')))
+            }
+        }
+    }
+
     /// Part of the joint's stiffness that each contact across it has.
     pub(crate) fn share(&self) -> f64 {
         match self {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::elements::{ActiveSet, At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
-use super::loose::{Bumps, Profile};
+use super::loose::{Bumps, Profile, WornWall};
 use super::model::{ContactId, Model, Site};
 use crate::contact::{Coefficients, Parameters};
 use crate::machine::{LooseKind, Machine, Vec3, root};
@@ -144,7 +144,7 @@ impl Contacts {
             bristles += 3 * usize::from(first_bristle.is_some());
             let law = site.stiffness.coefficients(parameters, parameters.clearances()[site.play]);
             let mut contact = Contact::new(id, site, law, first_bristle);
-            let bumps = Bumps::of(&machine.loose_joints[site.joint], &site);
+            let bumps = Bumps::of(&machine.loose_joints[site.joint], site.place);
             contact.profile = bumps.map(|bumps| Box::new(Profile::new(site, bumps)));
             contact
         });
@@ -319,6 +319,16 @@ impl Contacts {
         }
         let profiles = || self.of_play(j, play).filter_map(|c| self.contacts[c].profile.as_ref());
         profiles().map(|profile| profile.mean_depth()).sum::<f64>() / profiles().count().max(1) as f64
+    }
+
+    /// Copies all walls that wear by direction, as at the latest evaluation, into `out`.
+    pub(crate) fn report_worn_walls(&self, out: &mut Vec<WornWall>) {
+        let mut count = 0;
+        for profile in self.contacts.iter().filter_map(|contact| contact.profile.as_ref()) {
+            profile.report(count, out);
+            count += 1;
+        }
+        out.truncate(count);
     }
 
     /// The worn wall of contact `c`, if it wears by direction.

@@ -59,7 +59,7 @@ pub use flight::{Flight, FreeFlightBody};
 pub use held::{HeldError, HeldMachine, drive_positions};
 pub(crate) use kinematics::angle_of;
 pub use kinematics::{Kinematics, Wrench};
-pub use loose::{Division, Edges, Grid, Part, Profile, Shape, Spot};
+pub use loose::{Division, Edges, Grid, Part, Profile, Shape, Spot, WornWall};
 pub use pairs::Opening;
 pub use reachable::{Farthest, TipFreedoms};
 pub use start::{OFF_PATH, poses_as_given};

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::Ledger;
-use crate::machine::{JointFrame, Mat3, Vec3};
-pub use crate::mechanism::ElementReport;
+use crate::machine::{JointFrame, LooseKind, Mat3, Vec3};
+use crate::mechanism::{Division, Part};
+pub use crate::mechanism::{ElementReport, WornWall};
 
 /// Everything that is reported about one instant. SI units, world axes.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +21,8 @@ pub struct Frame {
     /// Places where joints with several can touch: by joint, each in the order of
     /// [`LooseKind::site_names`](crate::machine::LooseKind::site_names).
     pub sites: Vec<SiteReport>,
+    /// Walls that wear by direction, by joint.
+    pub worn_walls: Vec<WornWall>,
     /// Joints that close loops in scene order: force, N, at the child's point and torque, N m, on the child.
     pub closing: Vec<[Vec3; 2]>,
     /// Force elements in scene order.
@@ -54,6 +57,15 @@ impl Frame {
     pub fn axes_of(&self, joint: &JointFrame) -> Mat3 {
         let own = joint.rotation.to_rotation_matrix().into_inner();
         joint.origin.body.and_then(|body| self.bodies.get(body)).map_or(own, |body| body.rotation * own)
+    }
+
+    /// Worn depth of cell `cell` of the part `part` of the surfaces of joint `joint` of the kind `kind`, m.
+    pub fn worn_depth(&self, joint: usize, kind: &LooseKind, division: &Division, (part, cell): (&Part, usize)) -> f64 {
+        let wall = self.worn_walls.iter().find(|wall| wall.joint == joint && wall.place == part.place);
+        wall.map_or_else(
+            || self.joints[joint].worn[kind.play_of(part.place)],
+            |wall| wall.depth(&division.direction(part, cell)),
+        )
     }
 
     /// Places of joint `joint` where it can touch; empty if there is only one.
@@ -135,9 +147,9 @@ pub struct JointReport {
     pub axial: f64,
     /// Angle by which a pin's axis is tilted in its bearing, or a block in its guide, rad; 0 for a ball.
     pub tilt: f64,
-    /// Current clearance (a live change ramps it at a bounded rate), with its worn part, m.
+    /// Current clearance (a live change ramps it at a bounded rate), with what has worn off evenly, m.
     pub clearance: f64,
-    /// By how much it has worn wider since the start, m, and its second play.
+    /// By how much it has worn wider since the start, m, and its second play; where it wears by direction, the mean over its walls.
     pub worn: [f64; 2],
     /// Current second play, m: along the axis of a pin, across the second pair of walls of a guide; 0 if it has none.
     pub second_clearance: f64,

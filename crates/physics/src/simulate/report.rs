@@ -38,6 +38,7 @@ pub(super) fn fill(
         out.joints.push(joint_report(mechanism, joint, contact_states, (j, time)));
         report_sites(mechanism, joint, j, &mut out.sites);
     }
+    mechanism.contacts.report_worn_walls(&mut out.worn_walls);
     out.closing.clear();
     out.closing.extend(mechanism.closing_loads());
     out.elastic = mechanism.elastic_energy(time) + mechanism.bristle_energy(y);

@@ -159,6 +159,16 @@ impl Division {
         None
     }
 
+    /// Direction of the middle of cell `cell` of `part`, in the axes of the carrier's body; of an undivided part z.
+    pub fn direction(&self, part: &Part, cell: usize) -> Vec3 {
+        let Edges { polar, azimuth } = part.edges(cell);
+        let middle = |edges: Option<[f64; 2]>, none: f64| edges.map_or(none, |[from, to]| 0.5 * (from + to));
+        let pole = if azimuth.is_some() { 0.25 * TAU } else { 0.0 };
+        let (polar, azimuth) = (middle(polar, pole), middle(azimuth, 0.0));
+        let ((sin, cos), (s, c)) = (libm::sincos(polar), libm::sincos(azimuth));
+        self.axes.tr_mul(&Vec3::new(sin * c, sin * s, cos))
+    }
+
     /// Whether `other` has the same cells, whatever their areas.
     pub(crate) fn has_cells_of(&self, other: &Self) -> bool {
         self.axes == other.axes
@@ -202,6 +212,8 @@ mod tests {
             let towards = |angle: f64| turn * Vec3::new(0.0, libm::cos(angle), libm::sin(angle));
             for (number, (part, cell)) in division.each().enumerate() {
                 let [from, to] = part.edges(cell).azimuth.expect("divided by it");
+                let middle = division.direction(part, cell) - towards(0.5 * (from + to));
+                assert!(middle.norm() < 1e-14);
                 for share in [0.01, 0.5, 0.99] {
                     let spot = Spot { place: part.place, direction: towards(from + share * (to - from)) };
                     assert_eq!(division.cell(&spot), Some(number));

@@ -11,7 +11,7 @@ mod wall;
 
 pub use division::{Division, Edges, Part, Shape, Spot};
 pub use implied::drop_implied;
-pub use profile::{Bumps, Profile};
+pub use profile::{Bumps, Profile, WornWall};
 pub use sphere::Grid;
 pub use wall::{Edge, Stiffness, Wall};
 

@@ -51,20 +51,24 @@ pub struct Bumps {
 }
 
 impl Bumps {
-    /// Those of a site of `joint`; `None` where its wall is not round, or it does not wear by direction.
-    pub fn of(joint: &LooseJoint, site: &Site) -> Option<Arc<Self>> {
-        let round = matches!(site.wall, Wall::Socket | Wall::Bore(..));
-        (round && joint.contact.has_profile()).then(|| match joint.kind {
-            LooseKind::Ball => Arc::new(Self::on_sphere()),
-            LooseKind::Pin(_) | LooseKind::Slide(_) => {
+    /// Those of the place `place` of `joint`, an index among the names of its sites; `None` where its wall is not round, or does not wear by
+    /// direction.
+    pub fn of(joint: &LooseJoint, place: u8) -> Option<Arc<Self>> {
+        if !joint.contact.has_profile() {
+            return None;
+        }
+        match joint.kind {
+            LooseKind::Ball => Some(Arc::new(Self::on_sphere())),
+            LooseKind::Pin(_) if joint.kind.play_of(place) == 0 => {
                 let division = joint.division();
                 let sectors = division.parts().iter().find_map(|part| match part.shape {
-                    Shape::Ring { sectors } if part.place == site.place => Some(sectors),
+                    Shape::Ring { sectors } if part.place == place => Some(sectors),
                     _ => None,
                 });
-                Arc::new(Self::on_ring(division.axes(), sectors.unwrap_or(1)))
+                sectors.map(|sectors| Arc::new(Self::on_ring(division.axes(), sectors)))
             }
-        })
+            LooseKind::Pin(_) | LooseKind::Slide(_) => None,
+        }
     }
 
     /// On a golden-section spiral from pole to pole.
@@ -158,6 +162,45 @@ impl Bumps {
     }
 }
 
+/// A wall that wears by direction, at one instant. Directions are unit vectors in the axes of the body of its joint's carrier, from the
+/// middle of the wall to it.
+#[derive(Clone, Debug)]
+pub struct WornWall {
+    /// Index of its joint among those with play.
+    pub joint: usize,
+    /// Index among [`LooseKind::site_names`](crate::machine::LooseKind::site_names); 0 for a kind with one place.
+    pub place: u8,
+    bumps: Arc<Bumps>,
+    /// Of the bumps, m.
+    depths: Vec<f64>,
+}
+
+impl WornWall {
+    /// That of place `place` of `joint`, whose index is `index`, with these depths of its bumps, m; `None` where no wall wears by
+    /// direction.
+    pub(crate) fn new(joint: &LooseJoint, index: usize, place: u8, depths: &[f64]) -> Option<Self> {
+        let bumps = Bumps::of(joint, place).filter(|bumps| bumps.len() == depths.len())?;
+        Some(Self { joint: index, place, bumps, depths: depths.to_vec() })
+    }
+
+    /// Largest worn depth, m, of those in the directions of its bumps, which are closer together than a bump is wide.
+    pub fn deepest(&self) -> f64 {
+        self.bumps.directions.iter().map(|direction| self.depth(direction)).fold(0.0, f64::max)
+    }
+
+    /// Worn depth in a direction, m.
+    pub fn depth(&self, direction: &Vec3) -> f64 {
+        self.bumps.depth(&self.depths, direction)
+    }
+
+    /// Where the centre of the part is, from the middle of the wall, m, when it touches the wall in a direction across which the wall lies
+    /// there. `clearance` is that without wear, m.
+    pub fn limit(&self, direction: &Vec3, clearance: f64) -> Vec3 {
+        let (value, gradient, _) = self.bumps.derivatives(&self.depths, direction);
+        direction * (clearance + value - gradient.dot(direction)) + gradient
+    }
+}
+
 /// The worn wall of a contact.
 #[derive(Debug)]
 pub struct Profile {
@@ -190,6 +233,22 @@ impl Profile {
             worn: [false; 2],
             toward: Vec3::zeros(),
             turning: Mat3::zeros(),
+        }
+    }
+
+    /// Copies it at the time last chosen to the walls of `to` from the one at `index` on; a new one is added.
+    pub fn report(&self, index: usize, to: &mut Vec<WornWall>) {
+        let (joint, place, depths) = (self.unworn.joint, self.unworn.place, &self.depths[self.now]);
+        match to.get_mut(index) {
+            Some(wall) if wall.depths.len() == depths.len() => {
+                (wall.joint, wall.place) = (joint, place);
+                wall.bumps = Arc::clone(&self.bumps);
+                wall.depths.copy_from_slice(depths);
+            }
+            _ => {
+                to.truncate(index);
+                to.push(WornWall { joint, place, bumps: Arc::clone(&self.bumps), depths: depths.clone() });
+            }
         }
     }
 

@@ -49,8 +49,8 @@ pub(super) fn division(slide: &Slide, joint: &LooseJoint) -> Division {
     // In a plane two corners are one.
     let areas = [x * z * if slide.half_height.is_some() { 1.0 } else { 2.0 }, x * y];
     let plays = joint.contact.clearances();
-    let parts = joint.kind.site_names().iter().zip(0..).filter_map(|(name, place)| {
-        let across = usize::from(name.ends_with('z'));
+    let parts = (0..joint.kind.site_names().len() as u8).filter_map(|place| {
+        let across = joint.kind.play_of(place);
         (plays[across] > 0.0).then(|| Part { place, shape: Shape::Whole, area: areas[across] })
     });
     Division::along_axes(&joint.frames[0], parts.collect())

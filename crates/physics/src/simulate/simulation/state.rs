@@ -8,7 +8,7 @@ use super::{
 use crate::contact::{self, ContactPhase, ContactState};
 use crate::integrate::{Polynomial, Step};
 use crate::machine::{AppliedForces, Conditions, LiveElements, Machine};
-use crate::mechanism::{ContactId, Flight, Mechanism, Pull, Worn};
+use crate::mechanism::{ContactId, Flight, Mechanism, Pull, Worn, WornWall};
 use crate::simulate::impacts::{ForcePeak, Impact, Impacts};
 use crate::simulate::ledger::{Account, Ledger};
 use crate::simulate::peaks::{Approach, Recent};
@@ -158,9 +158,9 @@ impl State {
         self.plays(j)[0]
     }
 
-    /// Current plays of loose joint `j`, m; 0 where it is ideal.
+    /// Current plays of loose joint `j`, m; 0 where it is ideal. What wears by direction is not part of them.
     pub fn plays(&self, j: usize) -> [f64; 2] {
-        let worn = self.worn(j);
+        let worn = self.worn_evenly(j);
         std::array::from_fn(|play| self.plays_without_wear(j)[play] + worn[play])
     }
 
@@ -187,6 +187,12 @@ impl State {
         let first: usize = self.joints[..j].iter().map(|joint| joint.contacts).sum();
         let own = &self.profiles[first..first + self.joints[j].contacts];
         own.iter().map(|depths| &**depths).filter(|depths| !depths.is_empty())
+    }
+
+    /// The walls of loose joint `j` of `machine` that wear by direction.
+    pub fn worn_walls(&self, machine: &Machine, j: usize) -> Vec<WornWall> {
+        let joint = &machine.loose_joints[j];
+        self.profiles(j).zip(0..).filter_map(|(depths, place)| WornWall::new(joint, j, place, depths)).collect()
     }
 
     fn mean_profile(&self, j: usize) -> f64 {
