@@ -251,7 +251,13 @@ impl Microscope {
             LooseKind::Slide(kind) => slide::draw(&sheet, &kind, path(0), now),
             LooseKind::Ball | LooseKind::Pin(_) => self.circle_of(&sheet, path(0), now, axes),
         };
-        response.on_hover_text(help);
+        let worn = match magnified.walls.is_empty() {
+            true => "",
+            false => {
+                " Of a wall that wears by direction the faint circle is the clearance without wear, and the outline how far the centre can go."
+            }
+        };
+        response.on_hover_text(format!("{help}{worn}"));
     }
 
     /// The clearance circle of a joint that touches at one place.

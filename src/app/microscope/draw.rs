@@ -1,5 +1,7 @@
 //! Pictures of the microscope: plane view of the clearance sphere, and section of the contact.
 
+use std::f64::consts::TAU;
+
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::Vec3;
 
@@ -216,7 +218,8 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let report = &magnified.report;
     let (circle, has_triad) = place_circle(*rect);
     let clearance = report.clearance as f32;
-    let scale = circle.radius / clearance;
+    let worn = outline(magnified, 0, axes);
+    let scale = circle.radius / worn.as_ref().map_or(clearance, |worn| worn.reach);
     let project = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
 
     let hairline = Stroke::new(1.0, sheet.faint.gamma_multiply(0.5));
@@ -224,11 +227,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
         let end = reach * circle.radius;
         painter.line_segment([circle.centre - end, circle.centre + end], hairline);
     }
-    painter.circle_stroke(
-        circle.centre,
-        circle.radius,
-        Stroke::new(1.5, colour(palette.socket.colour.with_opacity(0.9))),
-    );
+    wall(sheet, (circle.centre, scale), clearance, worn.as_ref());
 
     let place = |v: Vec3| circle.centre + project(v) * scale;
     let ball_centre = place(to_f32(&report.eccentricity));
@@ -238,9 +237,8 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let contact = colour(palette.normal);
     if let (true, Some(normal)) = (touches, magnified.normal) {
         // The clearance sphere bounds the ball's centre, so contact and normal are drawn there.
-        let normal = to_f32(&normal);
-        let foot = place(normal * clearance);
-        let out = project(normal);
+        let foot = place(to_f32(&magnified.limit(0, &normal)));
+        let out = project(to_f32(&normal));
         painter.line_segment([foot, foot + out * 22.0], Stroke::new(2.0, contact));
         let across = vec2(-out.y, out.x) * 9.0;
         painter.line_segment([foot - across, foot + across], Stroke::new(2.0, contact));
@@ -275,6 +273,42 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
         sheet.words(at, align, &words, colour(palette.trail));
     }
     circle
+}
+
+/// Directions in which the outline of a worn wall is found.
+const OUTLINE: u16 = 120;
+
+/// Outline of what a worn wall leaves to the centre of the part, seen in a plane.
+pub struct Outline {
+    /// Points to the right and down of the middle, m.
+    points: Vec<Vec2>,
+    /// Largest distance of one from it, m.
+    pub reach: f32,
+}
+
+/// That of the place `place` in the plane of `axes`, to the right and up; `None` of a wall that does not wear by direction.
+pub fn outline(magnified: &MagnifiedJoint, place: usize, axes: [Vec3; 2]) -> Option<Outline> {
+    magnified.walls.iter().find(|wall| usize::from(wall.place) == place)?;
+    let axes = axes.map(|axis| crate::machine::Vec3::from(axis.as_dvec3().to_array()).normalize());
+    let point = |i| {
+        let (sin, cos) = (TAU * f64::from(i) / f64::from(OUTLINE)).sin_cos();
+        let limit = magnified.limit(place, &(axes[0] * cos + axes[1] * sin));
+        vec2(limit.dot(&axes[0]) as f32, -limit.dot(&axes[1]) as f32)
+    };
+    let points: Vec<Vec2> = (0..OUTLINE).map(point).collect();
+    let reach = points.iter().map(|point| point.length()).fold(0.0, f32::max);
+    Some(Outline { points, reach })
+}
+
+/// The wall about a place on the screen, points per metre: a circle of the radius `clearance`, m, faint where it has worn to `worn`.
+pub fn wall(sheet: &Sheet<'_>, (centre, scale): (Pos2, f32), clearance: f32, worn: Option<&Outline>) {
+    let ink = colour(sheet.palette.socket.colour.with_opacity(0.9));
+    let unworn = if worn.is_some() { sheet.faint.gamma_multiply(0.6) } else { ink };
+    sheet.painter.circle_stroke(centre, clearance * scale, Stroke::new(1.5, unworn));
+    if let Some(Outline { points, .. }) = worn {
+        let around = points.iter().chain(points.first()).map(|point| centre + *point * scale);
+        polyline(&sheet.painter, around, Stroke::new(1.5, ink));
+    }
 }
 
 /// A path up to the point `end`, which is there at `now`, s; it fades with age. `place` projects a position, world axes.

@@ -8,7 +8,7 @@ use crate::app::player::Player;
 use crate::app::value;
 use crate::contact::ElasticLaw;
 use crate::machine::{Attachment, LooseKind, Mat3, Vec3};
-use crate::simulate::{ContactMode, Frame, Impact, JointReport, SiteReport};
+use crate::simulate::{ContactMode, Frame, Impact, JointReport, SiteReport, WornWall};
 
 /// Number of impacts covered by the path.
 pub const IMPACTS: usize = 6;
@@ -27,7 +27,9 @@ pub struct MagnifiedJoint {
     pub report: JointReport,
     /// Axes of the socket's body as columns.
     pub carrier: Mat3,
-    /// n = e/|e| (8); `None` where the centres coincide.
+    /// Walls that wear by direction.
+    pub walls: Vec<WornWall>,
+    /// n = e/|e| (8), or where a worn wall presses, against its force; `None` where the centres coincide.
     pub normal: Option<Vec3>,
     /// Velocity of the ball's centre relative to the socket's, de/dt, m/s.
     pub velocity: Vec3,
@@ -70,7 +72,12 @@ impl MagnifiedJoint {
         let report = *frame.joints.get(joint)?;
         let distance = report.eccentricity.norm();
         let ideal = report.state == ContactMode::Ideal;
-        let normal = (distance > 0.0 && !ideal).then(|| report.eccentricity / distance);
+        let walls: Vec<_> = frame.worn_walls.iter().filter(|wall| wall.joint == joint).cloned().collect();
+        let force = report.normal_force.norm();
+        let normal = (distance > 0.0 && !ideal).then(|| match force > 0.0 && !walls.is_empty() {
+            true => report.normal_force / -force,
+            false => report.eccentricity / distance,
+        });
         let velocity = velocity_of(frame, &spec.carried()) - velocity_of(frame, &spec.carrier());
         let touches = report.state.touches();
         let slides = touches && normal.is_some() && spec.kind == LooseKind::Ball;
@@ -95,6 +102,7 @@ impl MagnifiedJoint {
             axes: spec.frames.map(|own| frame.axes_of(&own)),
             touches: touches && normal.is_some(),
             carrier: axes_of(frame, spec.carrier().body),
+            walls,
             report,
             normal,
             velocity,
@@ -103,6 +111,15 @@ impl MagnifiedJoint {
             impact,
             since,
         })
+    }
+
+    /// Where the centre of the part is, from the middle of the wall at place `place`, m, when it touches that with the normal `normal`.
+    pub fn limit(&self, place: usize, normal: &Vec3) -> Vec3 {
+        let clearance = self.report.clearance;
+        match self.walls.iter().find(|wall| usize::from(wall.place) == place) {
+            Some(wall) => self.carrier * wall.limit(&self.carrier.tr_mul(normal), clearance),
+            None => normal * clearance,
+        }
     }
 
     /// Whether it can tilt.
@@ -128,14 +145,18 @@ impl MagnifiedJoint {
         let [off, play] = [report.eccentricity.norm(), report.clearance].map(|length| draw::length(length, 3));
         let [part, wall] = self.kind.parts();
         let state = value::contact(report.state, part);
+        let worn = match self.walls.is_empty() {
+            true => String::new(),
+            false => format!(", worn by {} on average", draw::length(report.worn[0], 3)),
+        };
         if self.kind == LooseKind::Ball {
             return format!(
-                "Ball joint {name} under the microscope. {state}. Ball's centre {off} from the socket's, clearance {play}."
+                "Ball joint {name} under the microscope. {state}. Ball's centre {off} from the socket's, clearance {play}{worn}."
             );
         }
         let title = if matches!(self.kind, LooseKind::Pin(_)) { "Pin" } else { "Slide" };
         let mut words = format!("{title} {name} under the microscope. {state}. ");
-        let _ = write!(words, "Middle of the {part} {off} off the {wall}'s axis, clearance {play}");
+        let _ = write!(words, "Middle of the {part} {off} off the {wall}'s axis, clearance {play}{worn}");
         if self.tilts() {
             let (tilt, axial) = (value::quantity(report.tilt, "deg", 3), draw::length(report.axial, 3));
             let _ = write!(words, ", tilt {tilt}, axial position {axial}");

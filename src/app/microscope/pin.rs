@@ -43,7 +43,6 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2], paths: [&[Point]; 2]
     let room = vec2(0.5 * rect.width(), (rect.height() - TITLE - below).max(40.0));
     let radius = 0.5 * SHARE * room.min_elem();
     let contact = colour(palette.normal);
-    let wall = colour(palette.socket.colour.with_opacity(0.9));
     let force = |place: usize| magnified.places.get(place).map_or(0.0, |(_, site)| site.normal_force.norm());
     let largest = force(0).max(force(1));
     for (place, axis) in ends_of_pin(kind, report, &magnified.axes).iter().enumerate() {
@@ -62,18 +61,36 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2], paths: [&[Point]; 2]
         for reach in [vec2(radius, 0.0), vec2(0.0, radius)] {
             painter.line_segment([centre - reach, centre + reach], hairline);
         }
-        painter.circle_stroke(centre, radius, Stroke::new(1.5, wall));
-        if report.clearance <= 0.0 {
+        let clearance = report.clearance as f32;
+        let worn = draw::outline(magnified, place, axes);
+        let scale = match &worn {
+            Some(worn) => radius / worn.reach,
+            None => radius / clearance,
+        };
+        if report.clearance > 0.0 {
+            draw::wall(sheet, (centre, scale), clearance, worn.as_ref());
+        } else {
+            let wall = colour(palette.socket.colour.with_opacity(0.9));
+            painter.circle_stroke(centre, radius, Stroke::new(1.5, wall));
             sheet.words(centre, Align2::CENTER_CENTER, "no radial play", sheet.faint);
             continue;
         }
         let project = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
-        let scaled = |v: Vec3| centre + project(v) * (radius / report.clearance as f32);
+        let scaled = |v: Vec3| centre + project(v) * scale;
         let at = scaled(to_f32(axis));
         draw::path(sheet, painter, paths[place], now, scaled, at);
         if touches {
-            let out = (at - centre).normalized();
-            let (foot, along) = (centre + out * radius, vec2(-out.y, out.x) * 9.0);
+            let (foot, out) = match worn {
+                None => {
+                    let out = (at - centre).normalized();
+                    (centre + out * radius, out)
+                }
+                Some(_) => {
+                    let normal = -site.normal_force.normalize();
+                    (scaled(to_f32(&magnified.limit(place, &normal))), project(to_f32(&normal)).normalized())
+                }
+            };
+            let along = vec2(-out.y, out.x) * 9.0;
             painter.line_segment([foot - along, foot + along], Stroke::new(2.0, contact));
         }
         if largest > 0.0 {

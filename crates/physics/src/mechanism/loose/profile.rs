@@ -9,7 +9,8 @@
 //! w is a sum of smooth bumps of equal shape about directions of even spacing, and the volume the sum of theirs. What a
 //! contact wears off is divided among them by overlap, as on an elastic foundation: c then tends to e . n, the wall of
 //! the ball itself, wherever that lies beyond it. c plus its second derivatives, the radius of curvature of the set in
-//! which the centre is free, decays in proportion to itself and stays positive, so that the largest overlap is at one place.
+//! which the centre is free, decays in proportion to itself and stays positive, so that the largest overlap is at one place. It tends to
+//! a small radius in place of 0, as if the ball were a little smaller there: the normal of a ball that fits its groove could turn at once.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -27,8 +28,12 @@ const ON_SPHERE: usize = 400;
 const SPHERE_BUMP: f64 = 60.0 * PI / 180.0;
 const SPHERE_OVERLAP: f64 = 20.0 * PI / 180.0;
 /// The same of each end of a bearing, of which the bumps are on the sectors of its wear map.
-const RING_BUMP: f64 = 25.0 * PI / 180.0;
+const RING_BUMP: f64 = 30.0 * PI / 180.0;
 const RING_OVERLAP: f64 = 10.0 * PI / 180.0;
+/// Least radius of curvature of the set in which the centre is free, over the distance of the centre from the middle, on a sphere and on a
+/// ring: more than what the spacing of the bumps takes off it.
+const SPHERE_TIGHTEST: f64 = 0.15;
+const RING_TIGHTEST: f64 = 0.05;
 /// Iterations for the direction of the largest overlap, and the change at which they end, rad.
 const ITERATIONS: u32 = 30;
 const TURN_TOLERANCE: f64 = 1e-12;
@@ -48,6 +53,8 @@ pub struct Bumps {
     smoothing: f64,
     /// Overlap, over the clearance, over which a contact of no depth wears.
     overlap: f64,
+    /// Least radius of curvature, over the distance of the part.
+    tightest: f64,
 }
 
 impl Bumps {
@@ -89,6 +96,7 @@ impl Bumps {
             sum: n * (1.0 - edge) / 14.0,
             smoothing: edge + 0.875 * (1.0 - edge),
             overlap: 1.0 - libm::cos(SPHERE_OVERLAP),
+            tightest: SPHERE_TIGHTEST,
         }
     }
 
@@ -100,8 +108,14 @@ impl Bumps {
         };
         let edge = libm::cos(RING_BUMP);
         let overlap = 1.0 - libm::cos(RING_OVERLAP);
-        let mut bumps =
-            Self { directions: (0..sectors).map(direction).collect(), edge, sum: 1.0, smoothing: 1.0, overlap };
+        let mut bumps = Self {
+            directions: (0..sectors).map(direction).collect(),
+            edge,
+            sum: 1.0,
+            smoothing: 1.0,
+            overlap,
+            tightest: RING_TIGHTEST,
+        };
         let cosines = || bumps.directions.iter().map(|at| at.dot(&bumps.directions[0]));
         let sum: f64 = cosines().map(|x| bumps.bump(x)[0]).sum();
         let smoothing = cosines().map(|x| x * bumps.bump(x)[0]).sum::<f64>() / sum;
@@ -146,8 +160,8 @@ impl Bumps {
         (value, gradient, curvature)
     }
 
-    /// Adds to `depths` what a contact wears off: `depth` is the volume over the area of the whole wall, m. Its part lies at `toward` from the middle,
-    /// `penetration` deep, where the clearance without wear is `clearance`, m.
+    /// Adds to `depths` what a contact wears off: `depth` is the volume over the area of the whole wall, m. It is cut as from `toward`
+    /// ([`Profile::cut`]), `penetration` deep, where the clearance without wear is `clearance`, m.
     pub fn deposit(&self, depths: &mut [f64], depth: f64, [clearance, penetration]: [f64; 2], toward: &Vec3) {
         let beyond = |at: &Vec3, depth: f64| at.dot(toward) / self.smoothing - depth;
         let gaps = self.directions.iter().zip(&*depths).map(|(at, depth)| beyond(at, *depth));
@@ -216,7 +230,8 @@ pub struct Profile {
     worn: [bool; 2],
     /// The part from the middle of the wall at the latest evaluation, m, in the axes of the worn body, like the rest.
     toward: Vec3,
-    /// Derivative of the normal with respect to that, 1/m.
+    /// The normal, towards the wall, and its derivative with respect to that, 1/m.
+    normal: Vec3,
     turning: Mat3,
 }
 
@@ -232,6 +247,7 @@ impl Profile {
             now: 1,
             worn: [false; 2],
             toward: Vec3::zeros(),
+            normal: Vec3::zeros(),
             turning: Mat3::zeros(),
         }
     }
@@ -282,9 +298,10 @@ impl Profile {
         depths.iter().sum::<f64>() / depths.len() as f64
     }
 
-    /// The part from the middle of the wall at the latest evaluation, m, in the axes of the worn body.
-    pub fn toward(&self) -> &Vec3 {
-        &self.toward
+    /// The part from the middle of the wall at the latest evaluation, m, in the axes of the worn body, less the least radius of curvature along
+    /// the normal.
+    pub fn cut(&self) -> Vec3 {
+        self.toward - self.normal * (self.bumps.tightest * self.toward.norm())
     }
 
     /// The end of the site on the worn body.
@@ -322,6 +339,7 @@ impl Profile {
         if !self.worn[self.now] {
             let length = toward.norm();
             let n = if length > 0.0 { toward / length } else { Vec3::zeros() };
+            self.normal = n;
             self.turning = if length > 0.0 { (across - n * n.transpose()) / length } else { Mat3::zeros() };
             return Vec3::zeros();
         }
@@ -340,7 +358,7 @@ impl Profile {
             let tangent = across - n * n.transpose();
             let slope = tangent * (toward - gradient);
             let against = tangent * (toward.dot(&n) - gradient.dot(&n)) + tangent * curvature * tangent;
-            self.turning = inverse_across(&against, &n, axis);
+            (self.normal, self.turning) = (n, inverse_across(&against, &n, axis));
             let mut turn = self.turning * slope;
             let size = turn.norm();
             iterations += 1;
@@ -442,18 +460,21 @@ mod tests {
                     // Pressed in by 0.1 um where the wall's normal is n.
                     let (value, gradient, _) = bumps.derivatives(depths, n);
                     let toward = n * (clearance + 1e-7 + value - gradient.dot(n)) + gradient;
-                    bumps.deposit(depths, 1e-8, [clearance, 1e-7], &toward);
+                    let cut = toward - n * (bumps.tightest * toward.norm());
+                    bumps.deposit(depths, 1e-8, [clearance, 1e-7], &cut);
                     deposited += 1e-8;
                 }
             };
             wear(&groove, 800, &mut depths);
             // The part has cut its own shape: the wall and the volume between the unworn wall and that of the part moved by the depth.
             let got = bumps.depth(&depths, &groove) / clearance;
-            let reach = 1.0 + got;
-            let edge = (1.0 / reach).acos();
+            // Rounded at the tip.
+            let tip = bumps.tightest * (1.0 + got);
+            let reach = 1.0 + got - tip;
+            let edge = ((1.0 - tip) / reach).acos();
             let mean = match axis {
-                Some(_) => (reach * edge.sin() - edge) / PI,
-                None => (reach - 1.0) * (reach - 1.0) / (4.0 * reach),
+                Some(_) => (reach * edge.sin() - (1.0 - tip) * edge) / PI,
+                None => 0.25 * reach * edge.sin().powi(2) - 0.5 * (1.0 - tip) * (1.0 - edge.cos()),
             };
             assert!((mean / 0.08 - 1.0).abs() < smoothing, "groove of {got}: mean {mean}, 0.08 deposited");
             for n in directions(axis, 200) {

@@ -29,7 +29,7 @@ pub(super) struct Growth {
 pub(super) struct Rub {
     /// Volume over the area of the whole wall, m/s; over the step m.
     depth: f64,
-    /// Where, from the middle of the wall, m, in the axes of the worn body.
+    /// Where: [`Profile::cut`].
     toward: Vec3,
     /// m.
     penetration: f64,
@@ -83,7 +83,7 @@ impl Rub {
         let places = mechanism.contacts.of_joint(mechanism.contacts.joint_of(c));
         let walls = places.filter(|&c| mechanism.contacts.profile(c).is_some()).count();
         let penetration = mechanism.contacts.gap(c).separation.penetration;
-        Self { depth: depth * walls as f64, toward: *profile.toward(), penetration }
+        Self { depth: depth * walls as f64, toward: profile.cut(), penetration }
     }
 }
 
