@@ -20,7 +20,10 @@ def run(
     every: float | str | None = None,
     channels: list[str] = ...,
     progress: Callable[[float], object] | None = None,
+    worn: dict[str, list[_Array]] = ...,
+    walls_from: float = 0.0,
 ) -> dict[str, Any]: ...
+def wear_on(scene: Scene, joint: str, walls: list[_Array], growth: list[_Array], factor: float) -> list[list[float]]: ...
 def tradeoff(scene: Scene, quick: bool, clock: Callable[[], float], progress: Callable[[float], object] | None = None) -> str: ...
 
 class Scene:

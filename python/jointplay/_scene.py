@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 Quantity = float | int | str
 """A number in SI units, or text with a unit."""
+Walls = Mapping[str, Sequence[NDArray[np.float64]]]
+"""Worn depths of walls that wear by direction, m, by joint."""
 
 
 @dataclass(frozen=True)
@@ -275,14 +277,32 @@ class Scene:
         channels: Sequence[str] = (),
         progress: Callable[[float], object] | None = None,
         warn: bool = True,
+        worn: Walls | None = None,
     ) -> Run:
         """Runs the scene for `duration`, s, with a row every `every`, s (a thousandth of the duration by default).
 
         `channels` are names or patterns (`"A.*"`); without any, the run records those that `jointplay run` writes. `progress`
-        is called with the fraction done, from 0 to 1. Doubts about the results become warnings unless `warn` is False.
+        is called with the fraction done, from 0 to 1. Doubts about the results become warnings unless `warn` is False. `worn` are
+        walls that have worn by direction (`contact.wear_shape = "profile"`), as in `Run.worn_walls` and `Wear.worn_walls`: the run starts with
+        them.
         """
+        return self._run(duration, every, channels, progress=progress, warn=warn, worn=worn)
+
+    def _run(
+        self,
+        duration: Quantity,
+        every: Quantity | None,
+        channels: Sequence[str],
+        *,
+        progress: Callable[[float], object] | None = None,
+        warn: bool = True,
+        worn: Walls | None = None,
+        walls_from: float = 0.0,
+    ) -> Run:
+        """As `run`; also keeps the worn walls at the first step from `walls_from` on, s."""
         names = [channels] if isinstance(channels, str) else list(channels)
-        results = _native.run(self.native, duration, every, names, progress)
+        walls = {joint: [np.asarray(wall, dtype=float) for wall in own] for joint, own in (worn or {}).items()}
+        results = _native.run(self.native, duration, every, names, progress, walls, walls_from)
         run = Run(self, results)
         if warn:
             for doubt in run.doubts:
@@ -342,6 +362,10 @@ class Run(Mapping[str, NDArray[np.float64]]):
         self.statistics: dict[str, Any] = results["statistics"]
         """Steps, evaluations and rejected steps; under `joints` the `peak_normal`, N, `peak_time`, s, and `impacts` of each, and of
         each of its two plays what has `worn` off, m, and the `worn_volume`, m^3."""
+        self.worn_walls: Walls = results["worn_walls"]
+        """By joint, of each of its walls that wear by direction how deep, m: of a socket on a spiral about z, of a bearing in the sectors of its
+        wear map. They are the heights of bumps whose sum is the worn depth; their mean is the volume over the area."""
+        self._walls_before: Walls = results["worn_walls_before"]
         self.impacts = impact_table(*results["impacts"])
         """One row per finished impact: the columns of `jointplay run --impacts`, with the names of the joints."""
 

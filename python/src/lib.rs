@@ -35,7 +35,7 @@ mod _native {
     #[pymodule_export]
     use super::render::render;
     #[pymodule_export]
-    use super::run::run;
+    use super::run::{run, wear_on};
     #[pymodule_export]
     use super::scene::{PyScene, scenes};
     #[pymodule_export]

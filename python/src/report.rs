@@ -1,9 +1,11 @@
 //! Results of a simulation so far, as plain Python data.
 
+use std::collections::BTreeMap;
+
 use jointplay_analysis::impact_row::{COLUMNS, row};
 use jointplay_physics::simulate::{Impact, Simulation};
 use numpy::ndarray::Array2;
-use numpy::{PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -50,6 +52,27 @@ pub fn ledger<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Option<
         all.set_item(name, value)?;
     }
     Ok(Some(all))
+}
+
+/// Worn depths by direction: by name of joint, of each of its walls that wear so, m.
+pub type Walls = BTreeMap<String, Vec<Vec<f64>>>;
+
+/// Those of the present state.
+pub fn walls(simulation: &Simulation) -> Walls {
+    let joints = simulation.machine().loose_joints.iter().enumerate();
+    let walls =
+        joints.map(|(j, joint)| (joint.name.clone(), simulation.state().profiles(j).map(<[f64]>::to_vec).collect()));
+    walls.filter(|(_, walls): &(_, Vec<_>)| !walls.is_empty()).collect()
+}
+
+/// The same as arrays.
+pub fn wall_arrays<'py>(py: Python<'py>, walls: &Walls) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    for (name, walls) in walls {
+        let arrays: Vec<_> = walls.iter().map(|wall| PyArray1::from_slice(py, wall)).collect();
+        all.set_item(name, arrays)?;
+    }
+    Ok(all)
 }
 
 /// Counters so far, and for each joint with play its largest normal force, N, when it occurred, s, the number of contacts

@@ -1,5 +1,7 @@
 //! A run from t = 0 with rows at equal intervals, as `jointplay run` makes it.
 
+use std::collections::BTreeMap;
+
 use jointplay_analysis::row_times::{RowReader, RowTimes};
 use jointplay_physics::simulate::{ChannelInfo, Impact, chosen_channels};
 use jointplay_scene::LiveScene;
@@ -32,6 +34,9 @@ struct Recorder {
     /// Rows so far.
     rows: usize,
     impacts: Vec<Impact>,
+    /// What has worn off by direction at the first step from this time on, s.
+    walls_from: f64,
+    walls: Option<report::Walls>,
 }
 
 impl Recorder {
@@ -52,6 +57,9 @@ impl Recorder {
             let stepped = self.live.step_until(self.duration);
             stepped.map_err(|stopped| (stopped.to_string(), Some(stopped.advice.to_string())))?;
             self.impacts.extend(self.live.take_impacts());
+            if self.walls.is_none() && self.live.time() >= self.walls_from {
+                self.walls = Some(report::walls(&self.live));
+            }
         }
         Ok(false)
     }
@@ -60,7 +68,8 @@ impl Recorder {
 /// Runs `scene` for `duration` with a row every `every`, and returns all results. `channels` are names or
 /// patterns; by default, those that `jointplay run` writes.
 #[pyfunction]
-#[pyo3(signature = (scene, duration, every=None, channels=Vec::new(), progress=None))]
+#[pyo3(signature = (scene, duration, every=None, channels=Vec::new(), progress=None, worn=BTreeMap::new(), walls_from=0.0))]
+#[allow(clippy::too_many_arguments, reason = "those of the Python function")]
 pub fn run<'py>(
     py: Python<'py>,
     scene: &PyScene,
@@ -68,6 +77,8 @@ pub fn run<'py>(
     every: Option<&Bound<'py, PyAny>>,
     channels: Vec<String>,
     progress: Option<&Bound<'py, PyAny>>,
+    worn: report::Walls,
+    walls_from: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let duration = read_duration("duration", duration)?;
     let every = match every {
@@ -86,6 +97,7 @@ pub fn run<'py>(
     let positive = || option_error(py, "every = 0: the interval between rows must be greater than 0");
     let times = RowTimes::new(duration, every).ok_or_else(positive)?;
     let mut live = scene.start(py)?;
+    set_walls(py, &mut live, &worn)?;
     let (all, _) = detached(py, || channels_at_start(&mut live))?;
     let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels lists them"));
     let channels = chosen_channels(all, &channels).map_err(failed)?;
@@ -96,7 +108,9 @@ pub fn run<'py>(
     }
     let readings = channels.iter().map(|channel| (channel.name.clone(), channel.reading())).collect();
     let reader = RowReader::new(times, 0, readings);
-    let mut run = Recorder { live, duration, reader, channels, values, capacity, rows: 0, impacts: Vec::new() };
+    let walls = (walls_from <= 0.0).then(|| report::walls(&live));
+    let impacts = Vec::new();
+    let mut run = Recorder { live, duration, reader, channels, values, capacity, rows: 0, impacts, walls_from, walls };
     let fault = loop {
         match detached(py, || run.advance(STEPS_BETWEEN_CHECKS))? {
             Ok(true) => break None,
@@ -106,6 +120,38 @@ pub fn run<'py>(
     };
     report_progress(py, progress, if fault.is_none() { 1.0 } else { run.live.time() / duration })?;
     results_dict(py, run, fault)
+}
+
+/// Starts with walls that have worn by direction.
+fn set_walls(py: Python<'_>, live: &mut LiveScene, worn: &report::Walls) -> PyResult<()> {
+    for (name, walls) in worn {
+        let joint = live.machine().loose_joints.iter().position(|joint| joint.name == *name);
+        let joint = joint.ok_or_else(|| option_error(py, &format!("worn: no joint with play named `{name}`")))?;
+        live.set_profiles(joint, walls).map_err(|why| option_error(py, &format!("worn: {why}")))?;
+    }
+    Ok(())
+}
+
+/// Worn depths of the walls of `joint`, m, after they wear on from `walls` by `factor` times `growth`, m.
+#[pyfunction]
+pub fn wear_on(
+    py: Python<'_>,
+    scene: &PyScene,
+    joint: &str,
+    walls: Vec<Vec<f64>>,
+    growth: Vec<Vec<f64>>,
+    factor: f64,
+) -> PyResult<Vec<Vec<f64>>> {
+    let mut live = scene.start(py)?;
+    set_walls(py, &mut live, &BTreeMap::from([(joint.to_owned(), walls)]))?;
+    let machine = live.machine();
+    let j = machine.loose_joints.iter().position(|own| own.name == joint).unwrap_or_default();
+    let clearance = machine.loose_joints[j].contact.clearance;
+    let mut worn = live.state().worn_walls(machine, j);
+    detached(py, || {
+        worn.iter_mut().zip(&growth).for_each(|(wall, growth)| wall.extrapolate(growth, factor, clearance));
+    });
+    Ok(worn.iter().map(|wall| wall.depths().to_vec()).collect())
 }
 
 fn allocate(rows: usize, columns: usize) -> PyResult<Vec<f64>> {
@@ -131,6 +177,8 @@ fn results_dict<'py>(py: Python<'py>, run: Recorder, fault: Option<Fault>) -> Py
     all.set_item("doubts", report::doubts(live))?;
     all.set_item("ledger", report::ledger(py, live)?)?;
     all.set_item("statistics", report::statistics(py, live)?)?;
+    all.set_item("worn_walls", report::wall_arrays(py, &report::walls(live))?)?;
+    all.set_item("worn_walls_before", report::wall_arrays(py, &run.walls.unwrap_or_default())?)?;
     all.set_item("impacts", report::impacts(py, live, &run.impacts)?)?;
     let (fault, advice) = fault.unzip();
     all.set_item("fault", fault)?;

@@ -34,9 +34,11 @@ const RING_OVERLAP: f64 = 10.0 * PI / 180.0;
 /// ring: more than what the spacing of the bumps takes off it.
 const SPHERE_TIGHTEST: f64 = 0.15;
 const RING_TIGHTEST: f64 = 0.05;
-/// Iterations for the direction of the largest overlap, and the change at which they end, rad.
+/// Bumps whose cosines are found at once.
+const BLOCK: usize = 8;
+/// Iterations for the direction of the largest overlap, and the change from which its square is nothing, rad.
 const ITERATIONS: u32 = 30;
-const TURN_TOLERANCE: f64 = 1e-12;
+const SMALL_TURN: f64 = 1e-7;
 /// Largest change of one, rad.
 const LARGEST_TURN: f64 = 0.3;
 
@@ -148,16 +150,20 @@ impl Bumps {
     /// The same with its gradient and second derivatives in space.
     fn derivatives(&self, depths: &[f64], n: &Vec3) -> (f64, Vec3, Mat3) {
         let (mut value, mut gradient, mut curvature) = (0.0, Vec3::zeros(), Mat3::zeros());
-        for (at, depth) in self.directions.iter().zip(depths) {
-            let x = at.dot(n);
-            if x > self.edge && *depth != 0.0 {
-                let [bump, first, second] = self.bump(x).map(|part| part * depth / self.sum);
-                value += bump;
-                gradient += at * first;
-                curvature += at * at.transpose() * second;
+        // Most bumps are out of reach: cosines first, by vector instructions, then the few that count.
+        for (block, depths) in self.directions.chunks(BLOCK).zip(depths.chunks(BLOCK)) {
+            let mut cosines = [f64::NEG_INFINITY; BLOCK];
+            cosines.iter_mut().zip(block).for_each(|(x, at)| *x = at.dot(n));
+            for ((x, at), depth) in cosines.iter().zip(block).zip(depths) {
+                if *x > self.edge && *depth != 0.0 {
+                    let [bump, first, second] = self.bump(*x).map(|part| part * depth);
+                    value += bump;
+                    gradient += at * first;
+                    curvature += at * (at * second).transpose();
+                }
             }
         }
-        (value, gradient, curvature)
+        (value / self.sum, gradient / self.sum, curvature / self.sum)
     }
 
     /// Adds to `depths` what a contact wears off: `depth` is the volume over the area of the whole wall, m. It is cut as from `toward`
@@ -175,6 +181,10 @@ impl Bumps {
         }
     }
 }
+
+/// Most of the clearance by which one part of an extrapolation deepens a bump, and most parts.
+const EXTRAPOLATED_AT_ONCE: f64 = 0.005;
+const MOST_PARTS: f64 = 2000.0;
 
 /// A wall that wears by direction, at one instant. Directions are unit vectors in the axes of the body of its joint's carrier, from the
 /// middle of the wall to it.
@@ -205,6 +215,29 @@ impl WornWall {
     /// Worn depth in a direction, m.
     pub fn depth(&self, direction: &Vec3) -> f64 {
         self.bumps.depth(&self.depths, direction)
+    }
+
+    /// Depths of its bumps, m.
+    pub fn depths(&self) -> &[f64] {
+        &self.depths
+    }
+
+    /// Wears on `factor` times as much as the depths of its bumps have grown by, `growth`, m: as much in each direction, but in the shape
+    /// that the part cuts as the wall deepens, so that a growth in few places does not become a slit that the part does not reach into.
+    /// `clearance` is that without wear, m.
+    pub fn extrapolate(&mut self, growth: &[f64], factor: f64, clearance: f64) {
+        let bumps = &self.bumps;
+        let most = growth.iter().copied().fold(0.0, f64::max) * factor;
+        let parts = (most / (EXTRAPOLATED_AT_ONCE * clearance)).ceil().clamp(1.0, MOST_PARTS);
+        for _ in 0..parts as usize {
+            for (direction, growth) in bumps.directions.iter().zip(growth).filter(|(_, growth)| **growth > 0.0) {
+                let (value, gradient, _) = bumps.derivatives(&self.depths, direction);
+                let toward = direction * (clearance + value - gradient.dot(direction)) + gradient;
+                let cut = toward - direction * (bumps.tightest * toward.norm());
+                let depth = growth * factor / (parts * bumps.len() as f64);
+                bumps.deposit(&mut self.depths, depth, [clearance, 0.0], &cut);
+            }
+        }
     }
 
     /// Where the centre of the part is, from the middle of the wall, m, when it touches the wall in a direction across which the wall lies
@@ -345,25 +378,31 @@ impl Profile {
         }
         let overlaps = bumps.directions.iter().zip(depths).map(|(at, depth)| at.dot(&toward) - depth);
         let best = overlaps.enumerate().fold((0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
-        // Where little has worn off, the part itself shows the way.
         let straight = across * toward;
         let length = straight.norm();
-        let mut n = (across * bumps.directions[best.0]).normalize();
-        if length > 0.0 && length - bumps.depth(depths, &(straight / length)) > best.1 {
-            n = straight / length;
-        }
+        // Where little has worn off, the part itself shows the way.
+        let mut n = if length > 0.0 { straight / length } else { bumps.directions[best.0] };
         let mut iterations = 0;
         loop {
             let (value, gradient, curvature) = bumps.derivatives(depths, &n);
+            iterations += 1;
+            if iterations == 1 && n.dot(&toward) - value < best.1 {
+                n = (across * bumps.directions[best.0]).normalize();
+                continue;
+            }
             let tangent = across - n * n.transpose();
             let slope = tangent * (toward - gradient);
             let against = tangent * (toward.dot(&n) - gradient.dot(&n)) + tangent * curvature * tangent;
-            (self.normal, self.turning) = (n, inverse_across(&against, &n, axis));
-            let mut turn = self.turning * slope;
+            let turning = inverse_across(&against, &n, axis);
+            self.turning = turning;
+            let mut turn = turning * slope;
             let size = turn.norm();
-            iterations += 1;
-            if size < TURN_TOLERANCE || iterations > ITERATIONS {
-                return n * (value - gradient.dot(&n)) + gradient;
+            if size < SMALL_TURN || iterations > ITERATIONS {
+                // The rest to first order.
+                self.normal = (n + turn).normalize();
+                let shift = n * (value - gradient.dot(&n)) + gradient;
+                let bent = curvature * turn;
+                return shift + turn * (value - gradient.dot(&n)) + bent - n * n.dot(&bent);
             }
             if size > LARGEST_TURN {
                 turn *= LARGEST_TURN / size;
@@ -530,9 +569,7 @@ mod tests {
                 let expected = from_centre.normalize();
                 let normal = (profile.toward - s).normalize();
                 assert!((normal - expected).norm() < 10.0 * tolerance, "{normal} {expected}");
-                // Along the normal, to the convergence of the search.
-                let again = profile.turning * (profile.toward - s);
-                assert!(again.norm() < 1e-9, "{again}");
+                assert!((normal - profile.normal).norm() < 1e-9, "{normal} {}", profile.normal);
             }
         }
     }

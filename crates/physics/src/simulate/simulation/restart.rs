@@ -41,6 +41,22 @@ pub enum RestartError {
         /// m or rad.
         open: f64,
     },
+    /// Other walls that wear by direction.
+    #[error("{joint} has {} walls that wear by direction, of {own:?} depths; given are {given:?}", own.len())]
+    Walls {
+        /// Name of the joint.
+        joint: String,
+        /// Numbers of depths given.
+        given: Vec<usize>,
+        /// Those that it has.
+        own: Vec<usize>,
+    },
+    /// A depth that nothing can wear.
+    #[error("a worn depth of {value:e} m; allowed finite depths from 0 m")]
+    WornDepth {
+        /// m.
+        value: f64,
+    },
     /// Deep inside a wall.
     #[error("{joint} is {depth:e} m inside its wall; allowed {allowed:e} m")]
     Inside {
@@ -90,6 +106,34 @@ impl Simulation {
         }
         let before = self.state.clone();
         let restarted = self.try_restart(time, y);
+        if restarted.is_err() {
+            self.state = before;
+            self.workspace.attach_to(&self.model, &mut self.state);
+        }
+        restarted
+    }
+
+    /// Begins anew, as [`Self::restart_at`], at the present state, with walls that have worn by direction to `walls`: of each of those of loose joint
+    /// `j` the depths of its bumps, m, as from [`State::profiles`].
+    ///
+    /// # Errors
+    /// Other walls, depths below 0, or parts deep in their walls; nothing has changed then.
+    pub fn set_profiles(&mut self, j: usize, walls: &[Vec<f64>]) -> Result<(), RestartError> {
+        let own: Vec<usize> = self.state.profiles(j).map(<[f64]>::len).collect();
+        let given: Vec<usize> = walls.iter().map(Vec::len).collect();
+        if own != given {
+            let joint = self.model.machine().loose_joints[j].name.clone();
+            return Err(RestartError::Walls { joint, given, own });
+        }
+        if let Some(value) = walls.iter().flatten().find(|depth| !(**depth >= 0.0 && depth.is_finite())) {
+            return Err(RestartError::WornDepth { value: *value });
+        }
+        let contacts = self.workspace.mechanism.contacts.of_joint(j);
+        let before = self.state.clone();
+        let worn = self.state.profiles[contacts].iter_mut().filter(|depths| !depths.is_empty());
+        worn.zip(walls).for_each(|(depths, wall)| depths.own().copy_from_slice(wall));
+        let (time, y) = (self.state.time(), self.state.vector().to_vec());
+        let restarted = self.try_restart(time, &y);
         if restarted.is_err() {
             self.state = before;
             self.workspace.attach_to(&self.model, &mut self.state);

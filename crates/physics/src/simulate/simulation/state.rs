@@ -181,9 +181,9 @@ impl State {
         self.joints[j].worn.map(|worn| worn.depth)
     }
 
-    /// Worn depths of the round walls of loose joint `j` that wear by direction, by the bumps of their profiles: one wall of a ball, one or two of a
-    /// pin.
-    pub(super) fn profiles(&self, j: usize) -> impl Iterator<Item = &[f64]> + Clone {
+    /// Worn depths of the round walls of loose joint `j` that wear by direction, m, by the bumps of their profiles: one wall of a ball, one
+    /// or two of a pin.
+    pub fn profiles(&self, j: usize) -> impl Iterator<Item = &[f64]> + Clone {
         let first: usize = self.joints[..j].iter().map(|joint| joint.contacts).sum();
         let own = &self.profiles[first..first + self.joints[j].contacts];
         own.iter().map(|depths| &**depths).filter(|depths| !depths.is_empty())
