@@ -150,7 +150,7 @@ pub fn wear_on(
     let mut worn = live.state().worn_walls(machine, j);
     detached(py, || {
         worn.iter_mut().zip(&growth).for_each(|(wall, growth)| wall.extrapolate(growth, factor, clearance));
-    });
+    })?;
     Ok(worn.iter().map(|wall| wall.depths().to_vec()).collect())
 }
 

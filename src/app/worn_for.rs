@@ -2,7 +2,8 @@
 //!
 //! The slider counts from the clearances as they were set. What it extrapolates becomes a change of parameters like any other, so that
 //! links, saved scenes and undo have it. The handle stands where the scene says: at the age of the run's scene if this slider made
-//! exactly that scene, otherwise at 0. So a change by hand, undo or another scene leave no age that is untrue.
+//! exactly that scene, otherwise at 0. So a change by hand, undo or another scene leave no age that is untrue. A machine with walls that
+//! wear by direction has no slider: no clearance says what they become.
 
 use std::sync::Arc;
 
@@ -11,6 +12,7 @@ use eframe::egui::{self, Key, RichText, Slider, Ui};
 use super::controls::panel_tooltip;
 use super::player::Player;
 use super::{keys, spoken, theme, value};
+use crate::machine::LooseJoint;
 use crate::scene::{Scene, SetError};
 use crate::units::format_quantity_digits;
 
@@ -49,8 +51,12 @@ struct Play {
 
 /// The plays of `scene` that wear.
 fn wearing_plays(scene: &Scene) -> Vec<Play> {
-    let joints = scene.machine.loose_joints.iter().enumerate();
-    let wearing = joints.filter(|(_, joint)| joint.contact.wear_coefficient > 0.0);
+    let all = &scene.machine.loose_joints;
+    let wearing = |joint: &LooseJoint| joint.contact.wear_coefficient > 0.0;
+    if all.iter().any(|joint| wearing(joint) && joint.wears_by_direction()) {
+        return Vec::new();
+    }
+    let wearing = all.iter().enumerate().filter(|(_, joint)| wearing(joint));
     let plays = wearing.flat_map(|(j, joint)| {
         let all = joint.contact.clearances().into_iter().zip(["clearance", "second_clearance"]).enumerate();
         let loose: Vec<_> = all.filter(|(_, (set, _))| *set > 0.0).collect();

@@ -349,6 +349,22 @@ def belt():
     return {"period": slip.t_events[1][0] + (breaks - caught) / speed, "highest": turns.max()}
 
 
+def groove():
+    """A pin that turns under its weight and cuts its own circle into its bearing: how far its axis sinks until the crescent between the
+    unworn circle and its own holds what k F s has removed, both as cosines in the play; and as deep in the wall as half of its weight
+    presses each end."""
+    clearance, radius, length = 1e-4, 1e-2, 24e-3
+    area = 2.0 * np.pi * radius * length
+    mean = 1e-7 * 10.0 * 100.0 * radius * 0.1 / area
+
+    def crescent(reach):
+        edge = np.arccos(clearance / reach)
+        return (reach * np.sin(edge) - clearance * edge) / np.pi - mean
+
+    reach = brentq(crescent, clearance * (1.0 + 1e-12), 1e-2)
+    return {"worn": mean, "off": reach + (5.0 / 0.5e10) ** (2.0 / 3.0)}
+
+
 JOINTS = Path(__file__).parents[2] / "physics" / "joints"
 
 
@@ -377,6 +393,7 @@ CASES = {
     "flores": flores,
     "level_pin": level_pin,
     "belt": belt,
+    "groove": groove,
     **{name: lambda name=name: contacts(name.removeprefix("joint_")) for name in (
         "joint_a", "joint_a_shaft", "joint_b", "joint_h", "joint_c", "joint_c_nofric", "joint_d1", "joint_d2"
     )},

@@ -63,7 +63,7 @@ impl Bumps {
     /// Those of the place `place` of `joint`, an index among the names of its sites; `None` where its wall is not round, or does not wear by
     /// direction.
     pub fn of(joint: &LooseJoint, place: u8) -> Option<Arc<Self>> {
-        if !joint.contact.has_profile() {
+        if !joint.wears_by_direction() {
             return None;
         }
         match joint.kind {

@@ -90,7 +90,8 @@ impl DoubtContext<'_> {
             distance: statistics.joints[j].axial,
             travel: travel(j),
         }));
-        let depth = |j: usize| self.state.worn(j).into_iter().fold(0.0, f64::max);
+        let deepest = |j: usize| self.state.profiles(j).flatten().copied().fold(0.0, f64::max);
+        let depth = |j: usize| self.state.worn(j).into_iter().fold(deepest(j), f64::max);
         let size = |j: usize| match self.machine.loose_joints[j].kind {
             LooseKind::Slide(Slide { half_length, .. }) => half_length,
             LooseKind::Ball | LooseKind::Pin(_) => self.machine.loose_joints[j].contact.ball_radius,
