@@ -286,30 +286,7 @@ class Scene:
         walls that have worn by direction (`contact.wear_shape = "profile"`), as in `Run.worn_walls` and `Wear.worn_walls`: the run starts with
         them.
         """
-        return self._run(duration, every, channels, progress=progress, warn=warn, worn=worn)
-
-    def _run(
-        self,
-        duration: Quantity,
-        every: Quantity | None,
-        channels: Sequence[str],
-        *,
-        progress: Callable[[float], object] | None = None,
-        warn: bool = True,
-        worn: Walls | None = None,
-        walls_from: float = 0.0,
-    ) -> Run:
-        """As `run`; also keeps the worn walls at the first step from `walls_from` on, s."""
-        names = [channels] if isinstance(channels, str) else list(channels)
-        walls = {joint: [np.asarray(wall, dtype=float) for wall in own] for joint, own in (worn or {}).items()}
-        results = _native.run(self.native, duration, every, names, progress, walls, walls_from)
-        run = Run(self, results)
-        if warn:
-            for doubt in run.doubts:
-                warnings.warn(f"{self.name}: {doubt}", DoubtWarning, stacklevel=2)
-        if results["fault"] is not None:
-            raise Stopped(results["fault"], time=run.end, advice=results["advice"], run=run)
-        return run
+        return run_scene(self, duration, every, channels, progress=progress, warn=warn, worn=worn)[0]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scene) and self.native == other.native
@@ -334,6 +311,30 @@ class Scene:
         )
         head = f"<b>{html.escape(self.title)}</b>"
         return f"{head}<table><tr><th>parameter</th><th>value</th><th></th></tr>{rows}</table>"
+
+
+def run_scene(
+    scene: Scene,
+    duration: Quantity,
+    every: Quantity | None = None,
+    channels: Sequence[str] = (),
+    *,
+    progress: Callable[[float], object] | None = None,
+    warn: bool = True,
+    worn: Walls | None = None,
+    walls_from: float = 0.0,
+) -> tuple[Run, Walls]:
+    """As `Scene.run`; also the worn walls at the first step from `walls_from` on, s."""
+    names = [channels] if isinstance(channels, str) else list(channels)
+    walls = {joint: [np.asarray(wall, dtype=float) for wall in own] for joint, own in (worn or {}).items()}
+    results = _native.run(scene.native, duration, every, names, progress, walls, walls_from)
+    run = Run(scene, results)
+    if warn:
+        for doubt in run.doubts:
+            warnings.warn(f"{scene.name}: {doubt}", DoubtWarning, stacklevel=3)
+    if results["fault"] is not None:
+        raise Stopped(results["fault"], time=run.end, advice=results["advice"], run=run)
+    return run, results["worn_walls_before"]
 
 
 def _unpickle(origin: Any) -> Scene:
@@ -365,7 +366,6 @@ class Run(Mapping[str, NDArray[np.float64]]):
         self.worn_walls: Walls = results["worn_walls"]
         """By joint, of each of its walls that wear by direction how deep, m: of a socket on a spiral about z, of a bearing in the sectors of its
         wear map. They are the heights of bumps whose sum is the worn depth; their mean is the volume over the area."""
-        self._walls_before: Walls = results["worn_walls_before"]
         self.impacts = impact_table(*results["impacts"])
         """One row per finished impact: the columns of `jointplay run --impacts`, with the names of the joints."""
 

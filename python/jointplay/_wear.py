@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from ._options import library, whole
+from ._scene import run_scene
 from .errors import DoubtWarning, OptionError
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ def wearing_plays(scene: Scene) -> list[Play]:
                 Play(key, joint, f"{joint}.{channel}") for key, channel in own if key in keys and value_of(scene, key) > 0.0
             ]
     if any(scene[f"joint.{joint}.wear_shape"] == "profile" for joint in scene.ball_joints):
-        walls = scene._run(0.0, None, ["time"], warn=False).worn_walls
+        walls = run_scene(scene, 0.0, channels=["time"], warn=False)[1]
         by_direction = {joint: tuple(len(wall) for wall in own) for joint, own in walls.items()}
         plays = [
             play._replace(walls=by_direction.get(play.joint, ())) if play.channel == f"{play.joint}.worn" else play
@@ -195,7 +196,7 @@ class WearingScene:
 
     def means(self, depths: Array) -> Array:
         """Of each play the mean of its depths, m."""
-        return np.array([np.mean(depths[part]) for part in self.parts])
+        return np.array([np.mean(depths[part]) for part in self.parts], dtype=np.float64)
 
     def at(self, depths: Array) -> Scene:
         """The scene with plays wider by `depths`, m, but for those that wear by direction."""
@@ -241,11 +242,13 @@ class WearingScene:
         every = self.period / self.rows
         scene, walls = self.at(depths).set(slowed), self.walls(depths)
         begin = self.settle * self.period
-        run = scene._run(periods * self.period, every, channels, warn=False, worn=walls, walls_from=begin)
+        run, before = run_scene(
+            scene, periods * self.period, every, channels, warn=False, worn=walls, walls_from=begin
+        )
         self.runs += 1
         first = self.settle * self.rows
         growth = [
-            np.concatenate(run.worn_walls[play.joint]) - np.concatenate(run._walls_before[play.joint])
+            np.concatenate(run.worn_walls[play.joint]) - np.concatenate(before[play.joint])
             if play.walls
             else np.array([run[play.channel][-1] - run[play.channel][first]])
             for play in self.plays

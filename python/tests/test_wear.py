@@ -118,3 +118,35 @@ def test_a_scene_in_which_nothing_wears_is_refused():
     ideal = jp.Scene.load("pendulum").set({"contact.clearance": 0.0, "contact.wear_coefficient": "1e-13 m^2/N"})
     with pytest.raises(jp.OptionError, match="nothing wears"):
         jp.wear(ideal, 10, period=1.0)
+
+
+def test_walls_wear_by_direction_and_jumps_follow_a_direct_run():
+    changes = {"contact.wear_shape": "profile", "contact.wear_coefficient": "1e-9 m^2/N"}
+    scene = jp.Scene.from_toml(PIN).set(changes | {"contact.normal_law": "gonthier", "contact.restitution": 0.2})
+    direct = scene.run(20 * TURN, channels=["J.worn", "J.clearance"], warn=False)
+    walls = direct.worn_walls["J"]
+    assert [len(wall) for wall in walls] == [72, 72]
+    assert np.mean(walls) == pytest.approx(direct["J.worn"][-1], rel=1e-12) and np.all(direct["J.clearance"] == 1e-4)
+    found = jp.wear(scene, 20, period=TURN, jump=10, tolerance=1.0, settle=2)
+    assert found.runs == 5 and found.depth["joint.J.play.radial"][-1] == pytest.approx(direct["J.worn"][-1], rel=0.02)
+    assert np.all(found.clearance["joint.J.play.radial"][1:] > 1e-4) and found.scene["joint.J.play.radial"] == 1e-4
+    for mine, other in zip(found.worn_walls["J"], walls, strict=True):
+        assert np.max(mine) == pytest.approx(np.max(other), rel=0.05) and np.argmax(mine) == pytest.approx(np.argmax(other), abs=1)
+    # The worn machine: the pin falls into its groove.
+    worn = found.scene.run("50 ms", channels=["J.eccentricity", "J.worn"], worn=found.worn_walls, warn=False)
+    assert worn["J.worn"][0] == pytest.approx(np.mean(found.worn_walls["J"]), rel=1e-12)
+    assert worn["J.eccentricity.z"][-1] < -1e-4 - 0.9 * np.max(found.worn_walls["J"])
+
+
+def test_walls_that_the_scene_does_not_have_are_refused():
+    scene = jp.Scene.from_toml(PIN).set({"contact.wear_shape": "profile"})
+    wall = np.zeros(72)
+    for worn, words in (
+        ({"K": [wall, wall]}, "no joint with play named `K`"),
+        ({"J": [wall]}, r"J has 2 walls that wear by direction, of \[72, 72\] depths; given are \[72\]"),
+        ({"J": [wall, wall - 1e-6]}, "a worn depth of -1e-6 m; allowed finite depths from 0 m"),
+        ({"J": [wall, wall + np.nan]}, "a worn depth of NaN m"),
+    ):
+        with pytest.raises(jp.OptionError, match=words):
+            scene.run("1 ms", worn=worn)
+    assert jp.Scene.from_toml(PIN).run("1 ms").worn_walls == {}

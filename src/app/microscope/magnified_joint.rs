@@ -183,6 +183,31 @@ mod tests {
     }
 
     #[test]
+    fn a_worn_wall_is_drawn_where_it_is_touched() {
+        let profile = [("contact.wear_shape", "profile"), ("contact.friction_law", "modified-coulomb")];
+        let wear = |coefficient| [profile[0], profile[1], ("contact.wear_coefficient", coefficient)];
+        for (scene, changes, steps) in [("pendulum", wear("1e-7 m^2/N"), 3000), ("worn-pin", wear("2e-7 m^2/N"), 1200)] {
+            let mut player = player(scene, &changes);
+            let (mut touched, mut deepest) = (0, 0.0_f64);
+            for _ in 0..steps {
+                player.single_step();
+                let magnified = MagnifiedJoint::of(&player, 0).expect("has a joint");
+                let Some(normal) = magnified.normal.filter(|_| magnified.report.normal_force.norm() > 0.0) else {
+                    continue;
+                };
+                // Beyond the drawn wall by the penetration, along the normal. A pin that lies flat is as deep at both ends.
+                let beyond = magnified.report.eccentricity - magnified.limit(0, &normal);
+                let expected = normal * magnified.report.penetration;
+                let tolerance = if scene == "worn-pin" { 2e-9 } else { 1e-12 };
+                assert!((beyond - expected).norm() < tolerance, "{scene}: {beyond} {expected}");
+                deepest = deepest.max(magnified.limit(0, &normal).norm() / magnified.report.clearance - 1.0);
+                touched += 1;
+            }
+            assert!(touched > 100 && deepest > 0.05, "{scene}: {touched} {deepest}");
+        }
+    }
+
+    #[test]
     fn the_sliding_velocity_is_that_of_the_friction_law() {
         for velocity in ["centres", "surface"] {
             let mut player = player("pendulum", &[("contact.friction_velocity", velocity)]);
