@@ -313,6 +313,18 @@ class Scene:
         return f"{head}<table><tr><th>parameter</th><th>value</th><th></th></tr>{rows}</table>"
 
 
+def read_walls(worn: Walls | None) -> dict[str, list[NDArray[np.float64]]]:
+    """Worn walls as a caller gives them."""
+    try:
+        walls = {str(joint): [np.array(wall, dtype=np.float64) for wall in own] for joint, own in (worn or {}).items()}
+    except (AttributeError, TypeError, ValueError) as error:
+        raise OptionError(f"worn: {error}; allowed as in Run.worn_walls: by joint, an array of depths, m, for each wall") from error
+    for joint, own in walls.items():
+        if any(wall.ndim != 1 for wall in own):
+            raise OptionError(f"worn: the walls of {joint}: allowed a one-dimensional array of depths, m, for each")
+    return walls
+
+
 def run_scene(
     scene: Scene,
     duration: Quantity,
@@ -323,18 +335,17 @@ def run_scene(
     warn: bool = True,
     worn: Walls | None = None,
     walls_from: float = 0.0,
-) -> tuple[Run, Walls]:
-    """As `Scene.run`; also the worn walls at the first step from `walls_from` on, s."""
+) -> tuple[Run, float, Walls]:
+    """As `Scene.run`; also the end of the first step from `walls_from` on, s, and the worn walls then."""
     names = [channels] if isinstance(channels, str) else list(channels)
-    walls = {joint: [np.asarray(wall, dtype=float) for wall in own] for joint, own in (worn or {}).items()}
-    results = _native.run(scene.native, duration, every, names, progress, walls, walls_from)
+    results = _native.run(scene.native, duration, every, names, progress, read_walls(worn), walls_from)
     run = Run(scene, results)
     if warn:
         for doubt in run.doubts:
             warnings.warn(f"{scene.name}: {doubt}", DoubtWarning, stacklevel=3)
     if results["fault"] is not None:
         raise Stopped(results["fault"], time=run.end, advice=results["advice"], run=run)
-    return run, results["worn_walls_before"]
+    return run, results["walls_time"], results["worn_walls_before"]
 
 
 def _unpickle(origin: Any) -> Scene:

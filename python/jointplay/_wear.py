@@ -135,7 +135,7 @@ def wearing_plays(scene: Scene) -> list[Play]:
                 Play(key, joint, f"{joint}.{channel}") for key, channel in own if key in keys and value_of(scene, key) > 0.0
             ]
     if any(scene[f"joint.{joint}.wear_shape"] == "profile" for joint in scene.ball_joints):
-        walls = run_scene(scene, 0.0, channels=["time"], warn=False)[1]
+        walls = run_scene(scene, 0.0, channels=["time"], warn=False)[2]
         by_direction = {joint: tuple(len(wall) for wall in own) for joint, own in walls.items()}
         plays = [
             play._replace(walls=by_direction.get(play.joint, ())) if play.channel == f"{play.joint}.worn" else play
@@ -242,13 +242,13 @@ class WearingScene:
         every = self.period / self.rows
         scene, walls = self.at(depths).set(slowed), self.walls(depths)
         begin = self.settle * self.period
-        run, before = run_scene(
+        run, since, before = run_scene(
             scene, periods * self.period, every, channels, warn=False, worn=walls, walls_from=begin
         )
         self.runs += 1
-        first = self.settle * self.rows
+        first, observed = self.settle * self.rows, self.observe * self.period
         growth = [
-            np.concatenate(run.worn_walls[play.joint]) - np.concatenate(before[play.joint])
+            (np.concatenate(run.worn_walls[play.joint]) - np.concatenate(before[play.joint])) * observed / (run.end - since)
             if play.walls
             else np.array([run[play.channel][-1] - run[play.channel][first]])
             for play in self.plays

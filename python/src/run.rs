@@ -36,7 +36,7 @@ struct Recorder {
     impacts: Vec<Impact>,
     /// What has worn off by direction at the first step from this time on, s.
     walls_from: f64,
-    walls: Option<report::Walls>,
+    walls: Option<(f64, report::Walls)>,
 }
 
 impl Recorder {
@@ -58,7 +58,7 @@ impl Recorder {
             stepped.map_err(|stopped| (stopped.to_string(), Some(stopped.advice.to_string())))?;
             self.impacts.extend(self.live.take_impacts());
             if self.walls.is_none() && self.live.time() >= self.walls_from {
-                self.walls = Some(report::walls(&self.live));
+                self.walls = Some((self.live.time(), report::walls(&self.live)));
             }
         }
         Ok(false)
@@ -108,7 +108,7 @@ pub fn run<'py>(
     }
     let readings = channels.iter().map(|channel| (channel.name.clone(), channel.reading())).collect();
     let reader = RowReader::new(times, 0, readings);
-    let walls = (walls_from <= 0.0).then(|| report::walls(&live));
+    let walls = (walls_from <= 0.0).then(|| (0.0, report::walls(&live)));
     let impacts = Vec::new();
     let mut run = Recorder { live, duration, reader, channels, values, capacity, rows: 0, impacts, walls_from, walls };
     let fault = loop {
@@ -122,11 +122,16 @@ pub fn run<'py>(
     results_dict(py, run, fault)
 }
 
+/// Index of the joint with play with this name.
+fn joint_named(py: Python<'_>, live: &LiveScene, name: &str) -> PyResult<usize> {
+    let joint = live.machine().loose_joints.iter().position(|joint| joint.name == *name);
+    joint.ok_or_else(|| option_error(py, &format!("worn: no joint with play named `{name}`")))
+}
+
 /// Starts with walls that have worn by direction.
 fn set_walls(py: Python<'_>, live: &mut LiveScene, worn: &report::Walls) -> PyResult<()> {
     for (name, walls) in worn {
-        let joint = live.machine().loose_joints.iter().position(|joint| joint.name == *name);
-        let joint = joint.ok_or_else(|| option_error(py, &format!("worn: no joint with play named `{name}`")))?;
+        let joint = joint_named(py, live, name)?;
         live.set_profiles(joint, walls).map_err(|why| option_error(py, &format!("worn: {why}")))?;
     }
     Ok(())
@@ -144,10 +149,13 @@ pub fn wear_on(
 ) -> PyResult<Vec<Vec<f64>>> {
     let mut live = scene.start(py)?;
     set_walls(py, &mut live, &BTreeMap::from([(joint.to_owned(), walls)]))?;
+    let j = joint_named(py, &live, joint)?;
     let machine = live.machine();
-    let j = machine.loose_joints.iter().position(|own| own.name == joint).unwrap_or_default();
     let clearance = machine.loose_joints[j].contact.clearance;
     let mut worn = live.state().worn_walls(machine, j);
+    if !worn.iter().map(|wall| wall.depths().len()).eq(growth.iter().map(Vec::len)) {
+        return Err(option_error(py, "growth: of other walls than those that have worn"));
+    }
     detached(py, || {
         worn.iter_mut().zip(&growth).for_each(|(wall, growth)| wall.extrapolate(growth, factor, clearance));
     })?;
@@ -178,7 +186,9 @@ fn results_dict<'py>(py: Python<'py>, run: Recorder, fault: Option<Fault>) -> Py
     all.set_item("ledger", report::ledger(py, live)?)?;
     all.set_item("statistics", report::statistics(py, live)?)?;
     all.set_item("worn_walls", report::wall_arrays(py, &report::walls(live))?)?;
-    all.set_item("worn_walls_before", report::wall_arrays(py, &run.walls.unwrap_or_default())?)?;
+    let (time, walls) = run.walls.unwrap_or_default();
+    all.set_item("walls_time", time)?;
+    all.set_item("worn_walls_before", report::wall_arrays(py, &walls)?)?;
     all.set_item("impacts", report::impacts(py, live, &run.impacts)?)?;
     let (fault, advice) = fault.unzip();
     all.set_item("fault", fault)?;

@@ -143,9 +143,13 @@ def test_walls_that_the_scene_does_not_have_are_refused():
     wall = np.zeros(72)
     for worn, words in (
         ({"K": [wall, wall]}, "no joint with play named `K`"),
-        ({"J": [wall]}, r"J has 2 walls that wear by direction, of \[72, 72\] depths; given are \[72\]"),
-        ({"J": [wall, wall - 1e-6]}, "a worn depth of -1e-6 m; allowed finite depths from 0 m"),
+        ({"J": [wall]}, r"J has 2 walls that wear by direction .*, of \[72, 72\] depths; given are \[72\]"),
+        ({"J": [wall, wall - 1e-6]}, "a worn depth of -1e-6 m; allowed 0 m to 1e-3 m, a tenth of the radius"),
+        ({"J": [wall, wall + 0.01]}, "a worn depth of 1e-2 m"),
         ({"J": [wall, wall + np.nan]}, "a worn depth of NaN m"),
+        ({"J": wall}, "one-dimensional"),
+        ({"J": 1.0}, "as in Run.worn_walls"),
+        ([wall], "as in Run.worn_walls"),
     ):
         with pytest.raises(jp.OptionError, match=words):
             scene.run("1 ms", worn=worn)

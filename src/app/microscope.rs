@@ -251,12 +251,7 @@ impl Microscope {
             LooseKind::Slide(kind) => slide::draw(&sheet, &kind, path(0), now),
             LooseKind::Ball | LooseKind::Pin(_) => self.circle_of(&sheet, path(0), now, axes),
         };
-        let worn = match magnified.walls.is_empty() {
-            true => "",
-            false => {
-                " Of a wall that wears by direction the faint circle is the clearance without wear, and the outline how far the centre can go."
-            }
-        };
+        let worn = if magnified.walls.is_empty() { "" } else { " The faint circle is the clearance without wear." };
         response.on_hover_text(format!("{help}{worn}"));
     }
 
@@ -268,13 +263,13 @@ impl Microscope {
         let speed = draw::round_up(approach.max(fastest).max(MIN_REFERENCE_SPEED));
         if magnified.kind == LooseKind::Ball {
             self.circle = Some(draw::sphere(sheet, axes, path, now, speed));
-            return "The circle is the clearance; the ball's centre leaves it only by the penetration. The path, seen from \
+            return "The outline is how far the ball's centre can go; it leaves that only by the penetration. The path, seen from \
                     the socket, covers the latest six impacts since the clearance last changed, and fades with age (recorded for the \
                     first 12 joints). In contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the ball's \
                     centre, in contact the sliding velocity of the friction law.";
         }
         self.circle = Some(draw::sphere(sheet, pin::across(magnified, axes), path, now, speed));
-        "Section across the pin's axis. The circle is the clearance; the middle of the pin leaves it only by the \
+        "Section across the pin's axis. The outline is how far the middle of the pin can go; it leaves that only by the \
          penetration. The path covers the latest six impacts since the clearance last changed, and fades with age \
          (recorded for the first 12 joints). In contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the pin's middle."
     }

@@ -188,7 +188,9 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
         });
         let mut words = format!("{joint}: {}", plays.collect::<Vec<_>>().join("; "));
         if let Some(deepest) = deepest {
-            let _ = write!(words, "; the first on average, at most {} um", significant(1e6 * deepest, 6));
+            // Of the first play, which alone can wear by direction.
+            let both = format!(" um on average and at most {} um", significant(1e6 * deepest, 6));
+            words = words.replacen(" um", &both, 1);
         }
         line("  worn", words);
     }

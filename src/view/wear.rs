@@ -77,11 +77,11 @@ impl SceneView {
             let (division, kind) = (wear.division(j), &shot.scene.machine.loose_joints[j].kind);
             division.each().zip(wear.cells(j)).map(move |((part, cell), totals)| {
                 let depth = || frame.worn_depth(j, kind, division, (part, cell));
-                (part, cell, map.value(totals, part.area, depth))
+                (j, part, cell, map.value(totals, part.area, depth))
             })
         };
-        let values = joints.clone().flat_map(|j| valued(j).map(|(.., value)| value));
-        let scale = WearScale { map, largest: values.fold(0.0, f32::max) };
+        let values: Vec<_> = joints.clone().flat_map(valued).collect();
+        let scale = WearScale { map, largest: values.iter().map(|(.., value)| *value).fold(0.0, f32::max) };
         out.wear_scale = Some(scale);
         if scale.largest <= 0.0 {
             return;
@@ -93,7 +93,7 @@ impl SceneView {
             // Rows of a rotation are columns of its inverse.
             let axis = |i: usize| super::to_f32(&division.row(i).transpose());
             let axes = body * Mat3::from_cols(axis(0), axis(1), axis(2));
-            for (part, cell, value) in valued(j).filter(|(.., value)| *value > 0.0) {
+            for &(_, part, cell, value) in values.iter().filter(|(own, .., value)| *own == j && *value > 0.0) {
                 let wall = frame.worn_walls.iter().find(|wall| wall.joint == j && wall.place == part.place);
                 // The wall is touched there as one about a middle moved by this.
                 let moved = wall.map_or(Vec3::ZERO, |wall| {

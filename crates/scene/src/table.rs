@@ -246,15 +246,15 @@ static TABLE: [Parameter; 31] = [
          area of its surfaces. With 0 nothing wears. 1 mm^3/(N m) is 1e-9 m^2/N.",
         "Archard (1953); Flores (2009)",
     ),
-    contact_choice!(
+    at_reset(contact_choice!(
         wear_shape,
         "Wear shape",
         WearShape,
-        "What a contact wears off. even takes it off the whole surface that the play is between, so that a ball and a \
+        "Where a contact takes off what it wears. even takes it off the whole surface that the play is between, so that a ball and a \
          bearing stay round; profile takes it off the wall of the socket or the bearing where it is touched. Collars and the \
-         walls of a guide wear evenly in any case. A change acts at the next reset.",
+         walls of a guide wear evenly in any case.",
         "Archard (1953); Flores (2009)",
-    ),
+    )),
     gravity(
         "gravity.x",
         field!(gravity.x),

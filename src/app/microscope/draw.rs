@@ -288,7 +288,7 @@ pub struct Outline {
 
 /// That of the place `place` in the plane of `axes`, to the right and up; `None` of a wall that does not wear by direction.
 pub fn outline(magnified: &MagnifiedJoint, place: usize, axes: [Vec3; 2]) -> Option<Outline> {
-    magnified.walls.iter().find(|wall| usize::from(wall.place) == place)?;
+    magnified.wall(place)?;
     let axes = axes.map(|axis| crate::machine::Vec3::from(axis.as_dvec3().to_array()).normalize());
     let point = |i| {
         let (sin, cos) = (TAU * f64::from(i) / f64::from(OUTLINE)).sin_cos();

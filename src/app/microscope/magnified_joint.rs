@@ -74,10 +74,9 @@ impl MagnifiedJoint {
         let ideal = report.state == ContactMode::Ideal;
         let walls: Vec<_> = frame.worn_walls.iter().filter(|wall| wall.joint == joint).cloned().collect();
         let force = report.normal_force.norm();
-        let normal = (distance > 0.0 && !ideal).then(|| match force > 0.0 && !walls.is_empty() {
-            true => report.normal_force / -force,
-            false => report.eccentricity / distance,
-        });
+        let presses = force > 0.0 && !walls.is_empty();
+        let normal = if presses { report.normal_force / -force } else { report.eccentricity / distance };
+        let normal = (distance > 0.0 && !ideal).then_some(normal);
         let velocity = velocity_of(frame, &spec.carried()) - velocity_of(frame, &spec.carrier());
         let touches = report.state.touches();
         let slides = touches && normal.is_some() && spec.kind == LooseKind::Ball;
@@ -116,10 +115,13 @@ impl MagnifiedJoint {
     /// Where the centre of the part is, from the middle of the wall at place `place`, m, when it touches that with the normal `normal`.
     pub fn limit(&self, place: usize, normal: &Vec3) -> Vec3 {
         let clearance = self.report.clearance;
-        match self.walls.iter().find(|wall| usize::from(wall.place) == place) {
-            Some(wall) => self.carrier * wall.limit(&self.carrier.tr_mul(normal), clearance),
-            None => normal * clearance,
-        }
+        self.wall(place)
+            .map_or(normal * clearance, |wall| self.carrier * wall.limit(&self.carrier.tr_mul(normal), clearance))
+    }
+
+    /// The wall at place `place`, if it wears by direction.
+    pub fn wall(&self, place: usize) -> Option<&WornWall> {
+        self.walls.iter().find(|wall| usize::from(wall.place) == place)
     }
 
     /// Whether it can tilt.
@@ -145,10 +147,8 @@ impl MagnifiedJoint {
         let [off, play] = [report.eccentricity.norm(), report.clearance].map(|length| draw::length(length, 3));
         let [part, wall] = self.kind.parts();
         let state = value::contact(report.state, part);
-        let worn = match self.walls.is_empty() {
-            true => String::new(),
-            false => format!(", worn by {} on average", draw::length(report.worn[0], 3)),
-        };
+        let mean = draw::length(report.worn[0], 3);
+        let worn = if self.walls.is_empty() { String::new() } else { format!(", worn by {mean} on average") };
         if self.kind == LooseKind::Ball {
             return format!(
                 "Ball joint {name} under the microscope. {state}. Ball's centre {off} from the socket's, clearance {play}{worn}."
@@ -186,7 +186,8 @@ mod tests {
     fn a_worn_wall_is_drawn_where_it_is_touched() {
         let profile = [("contact.wear_shape", "profile"), ("contact.friction_law", "modified-coulomb")];
         let wear = |coefficient| [profile[0], profile[1], ("contact.wear_coefficient", coefficient)];
-        for (scene, changes, steps) in [("pendulum", wear("1e-7 m^2/N"), 3000), ("worn-pin", wear("2e-7 m^2/N"), 1200)] {
+        for (scene, changes, steps) in [("pendulum", wear("1e-7 m^2/N"), 3000), ("worn-pin", wear("2e-7 m^2/N"), 1200)]
+        {
             let mut player = player(scene, &changes);
             let (mut touched, mut deepest) = (0, 0.0_f64);
             for _ in 0..steps {

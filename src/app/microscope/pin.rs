@@ -63,10 +63,7 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2], paths: [&[Point]; 2]
         }
         let clearance = report.clearance as f32;
         let worn = draw::outline(magnified, place, axes);
-        let scale = match &worn {
-            Some(worn) => radius / worn.reach,
-            None => radius / clearance,
-        };
+        let scale = radius / worn.as_ref().map_or(clearance, |worn| worn.reach);
         if report.clearance > 0.0 {
             draw::wall(sheet, (centre, scale), clearance, worn.as_ref());
         } else {
@@ -86,7 +83,8 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2], paths: [&[Point]; 2]
                     (centre + out * radius, out)
                 }
                 Some(_) => {
-                    let normal = -site.normal_force.normalize();
+                    let pressed = site.normal_force.try_normalize(0.0).map(|force| -force);
+                    let normal = pressed.unwrap_or_else(|| axis.normalize());
                     (scaled(to_f32(&magnified.limit(place, &normal))), project(to_f32(&normal)).normalized())
                 }
             };
@@ -122,7 +120,7 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2], paths: [&[Point]; 2]
     if has_faces {
         faces(sheet);
     }
-    "Sections across the bearing at both ends. The circles are the clearance; the mark is the pin's axis, which leaves them only by \
+    "Sections across the bearing at both ends. The outlines are how far the pin's axis can go; the mark is that axis, which leaves them only by \
      the penetration. Its path covers the latest six impacts and fades with age (recorded for the first 12 joints). In contact mark and wall are orange, and the arrow is the normal force on the pin. The line below is the \
      play along the axis, with the gaps of the collars: of a tilted pin they close before the mark reaches the end."
 }

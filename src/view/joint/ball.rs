@@ -94,8 +94,10 @@ pub fn cast(joint: &DrawnJoint, ray: &Ray, has_wall: bool) -> Option<f32> {
 
 /// Unit vector from a joint's ball to the contact point, and 1 while in contact.
 fn touch(report: &JointReport) -> [f32; 4] {
-    let outwards = to_f32(&report.eccentricity).normalize_or_zero();
-    outwards.extend(f32::from(u8::from(is_in_contact(report)))).to_array()
+    // A worn wall is touched where its normal is.
+    let worn = report.worn[0] > 0.0 && report.normal_force.norm() > 0.0;
+    let towards = if worn { -report.normal_force } else { report.eccentricity };
+    to_f32(&towards).normalize_or_zero().extend(f32::from(u8::from(is_in_contact(report)))).to_array()
 }
 
 /// The halves of all sockets, sorted from far to near as seen from `eye`.

@@ -336,9 +336,11 @@ impl Contacts {
         self.contacts[c].profile.as_deref()
     }
 
-    /// The same, to be changed.
-    pub(crate) fn profile_mut(&mut self, c: ContactId) -> Option<&mut Profile> {
-        self.contacts[c].profile.as_deref_mut()
+    /// As [`Profile::continue_from`] of contact `c`; of one without a profile nothing.
+    pub(crate) fn continue_profile(&mut self, c: ContactId, t: f64, depths: &[f64]) {
+        if let Some(profile) = &mut self.contacts[c].profile {
+            profile.continue_from(t, depths);
+        }
     }
 
     /// Continues the wear of joint `j` with `worn` from `t` on, the end of a step; within the step the clearance stays as it was.
@@ -366,6 +368,14 @@ impl Contacts {
         }
         if self.has_profiles {
             self.choose_profiles(t);
+        }
+    }
+
+    /// Lets the sites of all worn walls follow them.
+    #[inline]
+    fn follow_wear(&mut self, motion: &[Kinematics]) {
+        if self.has_profiles {
+            self.contacts.iter_mut().for_each(|contact| contact.follow_wear(motion));
         }
     }
 
@@ -400,9 +410,7 @@ impl Contacts {
             return;
         }
         self.move_clearances(at.t);
-        if self.has_profiles {
-            self.contacts.iter_mut().for_each(|contact| contact.follow_wear(at.motion));
-        }
+        self.follow_wear(at.motion);
         loads.counts.contacts += 1;
         for contact in &mut self.contacts {
             if self.skips_inactive && !contact.may_carry_force(at.active_set) {
@@ -423,6 +431,9 @@ impl Contacts {
 
     /// Completes the gaps of the latest evaluation, with `active_set`, and measures those it skipped.
     pub(super) fn complete_separations(&mut self, active_set: ActiveSet<'_>, motion: &[Kinematics]) {
+        if self.skips_inactive {
+            self.follow_wear(motion);
+        }
         for contact in &mut self.contacts {
             if self.skips_inactive && !contact.may_carry_force(active_set) {
                 contact.measure(motion);
@@ -435,6 +446,7 @@ impl Contacts {
     /// Gap geometry at `t`, without forces.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
         self.move_clearances(t);
+        self.follow_wear(motion);
         for contact in &mut self.contacts {
             contact.measure(motion);
         }
@@ -443,6 +455,9 @@ impl Contacts {
     /// The same for contact `c` alone.
     pub fn measure_one(&mut self, c: ContactId, t: f64, motion: &[Kinematics]) {
         self.move_clearances(t);
+        if self.has_profiles {
+            self.contacts[c].follow_wear(motion);
+        }
         self.contacts[c].measure(motion);
     }
 

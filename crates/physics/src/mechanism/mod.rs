@@ -579,6 +579,7 @@ impl Mechanism {
     }
 
     /// Straightens the bristles of contacts that have ended in the state `y` with the derivative `k`.
+    #[inline]
     pub(crate) fn release_bristles(&self, [y, k]: [&mut [f64]; 2], contact_states: &[ContactState]) {
         if self.contacts.bristles() == 0 {
             return;
@@ -591,6 +592,7 @@ impl Mechanism {
     }
 
     /// Energy stored in the bristles of the state `y`, J.
+    #[inline]
     pub(crate) fn bristle_energy(&self, y: &[f64]) -> f64 {
         if self.contacts.bristles() == 0 { 0.0 } else { self.contacts.bristle_energy(&y[self.first_bristle()..]) }
     }

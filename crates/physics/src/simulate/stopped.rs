@@ -54,6 +54,14 @@ pub enum StopFault {
         /// m.
         penetration: f64,
     },
+    /// A wall that has worn through.
+    #[error("joint {joint}: its wall has worn by {depth:.3e} m in one direction, more than its radius")]
+    WornThrough {
+        /// Name of the joint.
+        joint: String,
+        /// m.
+        depth: f64,
+    },
     /// A fixed step that stored more energy in a contact than the approach can have brought.
     #[error(
         "joint {joint}: one step put it {penetration:.3e} m inside its wall, with {times:.1} times the energy that it can have \
@@ -118,6 +126,9 @@ pub enum StopAdvice {
     /// The method does not suit the scene.
     #[error("try solver.method = automatic, or else a softer contact")]
     OtherMethod,
+    /// Nothing is left to wear.
+    #[error("try a smaller contact.wear_coefficient, or a shorter run")]
+    LessWear,
     /// A tolerance that cannot be met in this scene.
     #[error("try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene")]
     LooserTolerance {

@@ -118,7 +118,7 @@ impl Contact {
 
     /// Whether the change of the eccentricity over a step is the motion of its ends.
     pub fn moves_as_measured(&self) -> bool {
-        self.site.wall == Wall::Socket && self.profile.is_none()
+        self.site.wall == Wall::Socket && self.worn_profile().is_none()
     }
 
     /// Rate of the normal relative to the carrier, 1/s.
@@ -128,12 +128,21 @@ impl Contact {
         if matches!(self.site.wall, Wall::Plane(_)) || distance == 0.0 {
             return Vec3::zeros();
         }
-        let velocity = gap.eccentricity_rate - carrier.angular_velocity.cross(&gap.eccentricity);
-        if let Some(profile) = &self.profile {
-            return profile.normal_by_displacement(motion) * velocity;
+        if let Some(profile) = self.worn_profile() {
+            // Of the worn body, whose normal turns with the place alone, and with that.
+            let worn = &motion[profile.worn_body()].angular_velocity;
+            let velocity = gap.eccentricity_rate - worn.cross(&gap.eccentricity);
+            let turning = profile.normal_by_displacement(motion) * velocity;
+            return turning + (worn - carrier.angular_velocity).cross(&normal);
         }
+        let velocity = gap.eccentricity_rate - carrier.angular_velocity.cross(&gap.eccentricity);
         let across = self.site.wall.confined(&carrier.rotation) * velocity;
         (across - normal * normal.dot(&across)) / distance
+    }
+
+    /// Its wall, if that has worn by direction.
+    fn worn_profile(&self) -> Option<&Profile> {
+        self.profile.as_deref().filter(|profile| profile.has_worn())
     }
 
     /// Lets the site follow the worn wall, if there is one.
@@ -216,9 +225,8 @@ impl Contact {
         self.law.slip_velocity(n, &self.gap.eccentricity_rate, self.spins(motion), levers)
     }
 
-    /// Measures the eccentricity and its rate; forces are left unchanged.
+    /// Measures the eccentricity and its rate; forces are left unchanged. The site follows its worn wall already.
     pub fn measure(&mut self, motion: &[Kinematics]) {
-        self.follow_wear(motion);
         let site = &self.site;
         let (e, rate) = site.opening(motion, &site.arms(motion));
         (self.gap.eccentricity, self.gap.eccentricity_rate) = (e, rate);
@@ -310,7 +318,7 @@ impl ForceElement for Contact {
         let read = self.slip_velocity(&n, at.motion);
         let force = Force { normal: gap.normal_force, friction: gap.friction, slip_speed: gap.slip_speed };
         let Self { site, law, .. } = self;
-        let confined = match &self.profile {
+        let confined = match self.worn_profile() {
             None => site.wall.confined(&at.motion[site.carrier.body].rotation),
             // The normal turns by the curvature of the worn wall.
             Some(profile) => profile.normal_by_displacement(at.motion) * gap.separation.distance + n * n.transpose(),

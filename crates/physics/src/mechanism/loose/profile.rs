@@ -4,7 +4,8 @@
 //! in c / r, and its penetration is the largest of these: delta = max (e . n - c0 - w(n)), with the worn depth w. Where it is largest, e minus
 //! the gradient of w lies along n. So the contact is that of an unworn wall whose centre is the point s = w n + grad w, fixed to the worn
 //! part: its penetration is delta, and its rate is that of delta, since s moves at right angles to n as n turns. Forces, moments and powers are
-//! those of the unworn wall, and the energy is a function of the configuration alone.
+//! those of the unworn wall, and the energy is a function of the configuration alone. Where a wall has worn on all sides by more than its play, a ball in
+//! the middle is nearer to s than to any wall: the middle then goes with it.
 //!
 //! w is a sum of smooth bumps of equal shape about directions of even spacing, and the volume the sum of theirs. What a
 //! contact wears off is divided among them by overlap, as on an elastic foundation: c then tends to e . n, the wall of
@@ -18,7 +19,7 @@ use std::sync::Arc;
 use super::Shape;
 use crate::machine::{LooseJoint, LooseKind, Mat3, Vec3};
 use crate::mechanism::kinematics::Kinematics;
-use crate::mechanism::model::{Anchor, Site};
+use crate::mechanism::model::{Anchor, BodyIndex, Site};
 
 use super::Wall;
 
@@ -147,6 +148,12 @@ impl Bumps {
         self.directions.iter().zip(depths).map(depth).sum::<f64>() / self.sum
     }
 
+    /// As [`WornWall::limit`].
+    fn limit(&self, depths: &[f64], n: &Vec3, clearance: f64) -> Vec3 {
+        let (value, gradient, _) = self.derivatives(depths, n);
+        n * (clearance + value - gradient.dot(n)) + gradient
+    }
+
     /// The same with its gradient and second derivatives in space.
     fn derivatives(&self, depths: &[f64], n: &Vec3) -> (f64, Vec3, Mat3) {
         let (mut value, mut gradient, mut curvature) = (0.0, Vec3::zeros(), Mat3::zeros());
@@ -231,8 +238,7 @@ impl WornWall {
         let parts = (most / (EXTRAPOLATED_AT_ONCE * clearance)).ceil().clamp(1.0, MOST_PARTS);
         for _ in 0..parts as usize {
             for (direction, growth) in bumps.directions.iter().zip(growth).filter(|(_, growth)| **growth > 0.0) {
-                let (value, gradient, _) = bumps.derivatives(&self.depths, direction);
-                let toward = direction * (clearance + value - gradient.dot(direction)) + gradient;
+                let toward = bumps.limit(&self.depths, direction, clearance);
                 let cut = toward - direction * (bumps.tightest * toward.norm());
                 let depth = growth * factor / (parts * bumps.len() as f64);
                 bumps.deposit(&mut self.depths, depth, [clearance, 0.0], &cut);
@@ -243,8 +249,7 @@ impl WornWall {
     /// Where the centre of the part is, from the middle of the wall, m, when it touches the wall in a direction across which the wall lies
     /// there. `clearance` is that without wear, m.
     pub fn limit(&self, direction: &Vec3, clearance: f64) -> Vec3 {
-        let (value, gradient, _) = self.bumps.derivatives(&self.depths, direction);
-        direction * (clearance + value - gradient.dot(direction)) + gradient
+        self.bumps.limit(&self.depths, direction, clearance)
     }
 }
 
@@ -306,18 +311,13 @@ impl Profile {
         &self.bumps
     }
 
-    /// Sets the depths of its bumps, m, from `t` on, s; before that they remain.
+    /// Sets the depths of its bumps, m, from `t` on, s; before that they remain. At all times from minus infinity on.
     pub fn continue_from(&mut self, t: f64, depths: &[f64]) {
         self.depths.swap(0, 1);
         self.worn.swap(0, 1);
         self.depths[1].copy_from_slice(depths);
         self.worn[1] = depths.iter().any(|depth| *depth != 0.0);
         self.end = t;
-    }
-
-    /// The same at all times.
-    pub fn set(&mut self, depths: &[f64]) {
-        self.continue_from(f64::NEG_INFINITY, depths);
     }
 
     /// Chooses the depths at `t`, s.
@@ -342,10 +342,19 @@ impl Profile {
         if self.unworn.is_reversed { &mut site.carried } else { &mut site.carrier }
     }
 
+    /// Whether anything has worn off at the time last chosen.
+    pub fn has_worn(&self) -> bool {
+        self.worn[self.now]
+    }
+
+    /// The body with the wall that wears.
+    pub fn worn_body(&self) -> BodyIndex {
+        if self.unworn.is_reversed { self.unworn.carried.body } else { self.unworn.carrier.body }
+    }
+
     /// Derivative of the normal with respect to the eccentricity, 1/m, world axes.
     pub fn normal_by_displacement(&self, motion: &[Kinematics]) -> Mat3 {
-        let body = if self.unworn.is_reversed { self.unworn.carried.body } else { self.unworn.carrier.body };
-        let rotation = &motion[body].rotation;
+        let rotation = &motion[self.worn_body()].rotation;
         rotation * self.turning * rotation.transpose()
     }
 
@@ -369,7 +378,7 @@ impl Profile {
     fn find_shift(&mut self, axis: Option<&Vec3>) -> Vec3 {
         let (bumps, depths, toward) = (&*self.bumps, &self.depths[self.now], self.toward);
         let across = Mat3::identity() - axis.map_or_else(Mat3::zeros, |axis| axis * axis.transpose());
-        if !self.worn[self.now] {
+        if !self.has_worn() {
             let length = toward.norm();
             let n = if length > 0.0 { toward / length } else { Vec3::zeros() };
             self.normal = n;
@@ -397,15 +406,19 @@ impl Profile {
             self.turning = turning;
             let mut turn = turning * slope;
             let size = turn.norm();
+            if size > LARGEST_TURN {
+                turn *= LARGEST_TURN / size;
+            }
             if size < SMALL_TURN || iterations > ITERATIONS {
+                if n.dot(&toward) <= value {
+                    // In the middle of a wall that has worn on all sides: as far from it as an unworn one from its middle, if not farther.
+                    return toward;
+                }
                 // The rest to first order.
                 self.normal = (n + turn).normalize();
                 let shift = n * (value - gradient.dot(&n)) + gradient;
                 let bent = curvature * turn;
                 return shift + turn * (value - gradient.dot(&n)) + bent - n * n.dot(&bent);
-            }
-            if size > LARGEST_TURN {
-                turn *= LARGEST_TURN / size;
             }
             n = (n + turn).normalize();
         }
@@ -497,8 +510,7 @@ mod tests {
             let mut wear = |n: &Vec3, count: u32, depths: &mut Vec<f64>| {
                 for _ in 0..count {
                     // Pressed in by 0.1 um where the wall's normal is n.
-                    let (value, gradient, _) = bumps.derivatives(depths, n);
-                    let toward = n * (clearance + 1e-7 + value - gradient.dot(n)) + gradient;
+                    let toward = bumps.limit(depths, n, clearance + 1e-7);
                     let cut = toward - n * (bumps.tightest * toward.norm());
                     bumps.deposit(depths, 1e-8, [clearance, 1e-7], &cut);
                     deposited += 1e-8;
@@ -558,7 +570,7 @@ mod tests {
                 place: 0,
             };
             let mut profile = Profile::new(site, Arc::new(bumps));
-            profile.set(&depths);
+            profile.continue_from(f64::NEG_INFINITY, &depths);
             profile.choose(0.0);
             for n in directions(axis, 50) {
                 profile.toward = n * 1.5e-4;
@@ -592,7 +604,7 @@ mod tests {
                 place: 0,
             };
             let mut profile = Profile::new(site, Arc::new(bumps));
-            profile.set(&depths);
+            profile.continue_from(f64::NEG_INFINITY, &depths);
             profile.choose(0.0);
             let mut at = |toward: Vec3| {
                 profile.toward = toward;

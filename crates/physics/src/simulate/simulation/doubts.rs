@@ -4,7 +4,7 @@ use super::{Model, State};
 use crate::contact::{Coefficients, ElasticLaw, FrictionVelocity};
 use crate::integrate::Method;
 use crate::machine::{LooseJoint, LooseKind, MIN_IMPACT_STEPS, Machine, Pin, Slide};
-use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm};
+use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm, WornWall};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
 const MAX_BELOW_SPEED_FLOOR: f64 = 0.5;
@@ -90,12 +90,19 @@ impl DoubtContext<'_> {
             distance: statistics.joints[j].axial,
             travel: travel(j),
         }));
-        let deepest = |j: usize| self.state.profiles(j).flatten().copied().fold(0.0, f64::max);
-        let depth = |j: usize| self.state.worn(j).into_iter().fold(deepest(j), f64::max);
         let size = |j: usize| match self.machine.loose_joints[j].kind {
             LooseKind::Slide(Slide { half_length, .. }) => half_length,
             LooseKind::Ball | LooseKind::Pin(_) => self.machine.loose_joints[j].contact.ball_radius,
         };
+        let deepest = |j: usize| {
+            // Bumps are higher than their sum: few walls need to be asked.
+            let highest = self.state.profiles(j).flatten().copied().fold(0.0, f64::max);
+            if highest <= MAX_WORN * size(j) {
+                return highest;
+            }
+            self.state.worn_walls(&self.machine, j).iter().map(WornWall::deepest).fold(0.0, f64::max)
+        };
+        let depth = |j: usize| self.state.worn(j).into_iter().fold(deepest(j), f64::max);
         let worn = self.worst(MAX_WORN, |j| depth(j) / size(j));
         doubts.extend(worn.map(|(joints, j)| Doubt::Worn { joints, depth: depth(j), size: size(j) }));
         let usual = |j: usize| self.coefficients(j).damping;

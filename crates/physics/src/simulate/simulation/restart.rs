@@ -10,6 +10,8 @@ use crate::simulate::StartError;
 
 /// Deepest penetration at a restart, as a fraction of the ball radius or what stands in its place, as at any start.
 const DEEPEST: f64 = 0.01;
+/// Deepest wall that is set, as a fraction of that radius, as the play of any joint.
+const DEEPEST_WEAR: f64 = 0.1;
 /// Displacement for differences, in scales of the coordinates: truncation and rounding are then about equally small in a contact that
 /// is pressed in by a micrometre.
 const DIFFERENCE: f64 = 1e-7;
@@ -42,7 +44,10 @@ pub enum RestartError {
         open: f64,
     },
     /// Other walls that wear by direction.
-    #[error("{joint} has {} walls that wear by direction, of {own:?} depths; given are {given:?}", own.len())]
+    #[error(
+        "{joint} has {} walls that wear by direction (wear_shape = \"profile\"), of {own:?} depths; given are {given:?}",
+        own.len()
+    )]
     Walls {
         /// Name of the joint.
         joint: String,
@@ -52,10 +57,12 @@ pub enum RestartError {
         own: Vec<usize>,
     },
     /// A depth that nothing can wear.
-    #[error("a worn depth of {value:e} m; allowed finite depths from 0 m")]
+    #[error("a worn depth of {value:e} m; allowed 0 m to {allowed:e} m, a tenth of the radius")]
     WornDepth {
         /// m.
         value: f64,
+        /// m.
+        allowed: f64,
     },
     /// Deep inside a wall.
     #[error("{joint} is {depth:e} m inside its wall; allowed {allowed:e} m")]
@@ -125,8 +132,9 @@ impl Simulation {
             let joint = self.model.machine().loose_joints[j].name.clone();
             return Err(RestartError::Walls { joint, given, own });
         }
-        if let Some(value) = walls.iter().flatten().find(|depth| !(**depth >= 0.0 && depth.is_finite())) {
-            return Err(RestartError::WornDepth { value: *value });
+        let allowed = DEEPEST_WEAR * self.model.machine().loose_joints[j].contact.ball_radius;
+        if let Some(&value) = walls.iter().flatten().find(|depth| !(0.0..=allowed).contains(*depth)) {
+            return Err(RestartError::WornDepth { value, allowed });
         }
         let contacts = self.workspace.mechanism.contacts.of_joint(j);
         let before = self.state.clone();

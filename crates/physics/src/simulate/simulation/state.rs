@@ -195,13 +195,10 @@ impl State {
         self.profiles(j).zip(0..).filter_map(|(depths, place)| WornWall::new(joint, j, place, depths)).collect()
     }
 
+    /// Mean of what they have lost, m; walls of a joint have equally many bumps.
     fn mean_profile(&self, j: usize) -> f64 {
-        let mut means = self.profiles(j).map(|depths| depths.iter().sum::<f64>() / depths.len() as f64).peekable();
-        if means.peek().is_none() {
-            return 0.0;
-        }
-        let (count, sum) = means.fold((0.0, 0.0), |(count, sum), mean| (count + 1.0, sum + mean));
-        sum / count
+        let count = self.profiles(j).flatten().count();
+        if count == 0 { 0.0 } else { self.profiles(j).flatten().sum::<f64>() / count as f64 }
     }
 
     /// Volume worn off the walls of each play of loose joint `j` since the start, m^3: depth times area.

@@ -331,8 +331,7 @@ impl Stepping<'_> {
         }
         self.search_peaks();
         self.count_turns();
-        self.wear_walls();
-        Ok(())
+        self.wear_walls()
     }
 
     /// Counts the turns of angles that follow from poses at the current state.

@@ -11,7 +11,7 @@ use crate::contact::ContactState;
 use crate::integrate::System as _;
 use crate::machine::Vec3;
 use crate::mechanism::{ActiveSet, ContactId, Mechanism, Profile, Worn};
-use crate::simulate::Wear;
+use crate::simulate::{StopAdvice, StopFault, Stopped, Wear};
 
 /// Wear of the plays of a joint over a step.
 #[derive(Clone, Copy, Debug, Default)]
@@ -46,10 +46,15 @@ impl Attempt {
     }
 
     /// Records the rates of the latest evaluation of `mechanism` at node `instant` of the step.
+    #[inline]
     pub(super) fn record_rates(&mut self, instant: usize, mechanism: &Mechanism) {
-        if !mechanism.contacts.wears() {
-            return;
+        if mechanism.contacts.wears() {
+            self.record_rates_of_contacts(instant, mechanism);
         }
+    }
+
+    #[inline(never)]
+    fn record_rates_of_contacts(&mut self, instant: usize, mechanism: &Mechanism) {
         for c in 0..mechanism.contacts.len() {
             let power = mechanism.sliding_power(c);
             if power > 0.0 {
@@ -82,7 +87,8 @@ impl Rub {
         // What a place loses is a share of the wall's volume: the walls of a joint share its area.
         let places = mechanism.contacts.of_joint(mechanism.contacts.joint_of(c));
         let walls = places.filter(|&c| mechanism.contacts.profile(c).is_some()).count();
-        let penetration = mechanism.contacts.gap(c).separation.penetration;
+        // At the end of a step of mean rates it may have left its wall.
+        let penetration = mechanism.contacts.gap(c).separation.penetration.max(0.0);
         Self { depth: depth * walls as f64, toward: profile.cut(), penetration }
     }
 }
@@ -119,26 +125,33 @@ impl Stepping<'_> {
     }
 
     /// Widens the plays by what wore off in the step just accepted.
-    pub(super) fn wear_walls(&mut self) {
+    ///
+    /// # Errors
+    /// A wall has worn through.
+    pub(super) fn wear_walls(&mut self) -> Result<(), Stopped> {
         if !self.mechanism.contacts.wears() {
-            return;
+            return Ok(());
         }
         let located = self.locates();
         let Self { mechanism, state, attempt, .. } = self;
         let t = state.now.t;
-        let mut moved = false;
+        let (mut moved, mut through) = (false, None);
         for (c, rubs) in attempt.abrasion.iter().enumerate() {
             if rubs.iter().all(|rub| rub.depth == 0.0) {
                 continue;
             }
             moved = true;
             let clearance = mechanism.contacts.clearance(c);
-            if let Some(profile) = mechanism.contacts.profile_mut(c) {
+            if let Some(profile) = mechanism.contacts.profile(c) {
                 let depths = state.profiles[c].own();
                 for Rub { depth, toward, penetration } in rubs.iter().filter(|rub| rub.depth > 0.0) {
                     profile.bumps().deposit(depths, *depth, [clearance, *penetration], toward);
                 }
-                profile.continue_from(t, depths);
+                let deepest = depths.iter().copied().fold(0.0, f64::max);
+                if deepest > mechanism.contacts.coefficients(c).ball_radius {
+                    through = Some((c, deepest));
+                }
+                mechanism.contacts.continue_profile(c, t, depths);
             }
         }
         for (j, growth) in attempt.wearing.iter().enumerate() {
@@ -154,7 +167,7 @@ impl Stepping<'_> {
             mechanism.contacts.continue_wear(j, t, *worn);
         }
         if !moved {
-            return;
+            return Ok(());
         }
         mechanism.forget_evaluation();
         let now = &mut state.now;
@@ -183,5 +196,10 @@ impl Stepping<'_> {
         }
         state.record.account.powers = None;
         mechanism.forget_evaluation();
+        let Some((c, depth)) = through else {
+            return Ok(());
+        };
+        let joint = self.machine.loose_joints[self.mechanism.contacts.joint_of(c)].name.clone();
+        Err(self.stopped(StopFault::WornThrough { joint, depth }, StopAdvice::LessWear))
     }
 }

@@ -102,8 +102,6 @@ pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &
         }
     }
     for (c, depths) in state.profiles.iter().enumerate() {
-        if let Some(profile) = mechanism.contacts.profile_mut(c) {
-            profile.set(depths);
-        }
+        mechanism.contacts.continue_profile(c, f64::NEG_INFINITY, depths);
     }
 }
