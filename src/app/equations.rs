@@ -27,7 +27,7 @@ fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
         "slip_speed_low" | "slip_speed_high" => return of(FrictionLaw::ModifiedCoulomb, correction),
         "static_friction_ratio" | "stribeck_speed" => return of(FrictionLaw::Bristle, correction),
         "bristle_stiffness" | "bristle_damping" => return of(FrictionLaw::Bristle, friction),
-        "restitution" | "normal_law" => contact.normal_law.shown(contact.elasticity),
+        "restitution" | "yield_speed" | "normal_law" => contact.normal_law.shown(contact.elasticity),
         _ => return None,
     })
 }

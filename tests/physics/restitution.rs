@@ -69,6 +69,68 @@ fn an_undisturbed_impact_has_the_restitution_of_its_law() {
 }
 
 #[test]
+fn above_the_yield_speed_the_restitution_falls_with_the_fourth_root_of_the_speed() {
+    for (word, law) in [("gonthier", NormalLaw::Gonthier), ("flores", NormalLaw::Flores)] {
+        for method in METHODS {
+            let changes = [
+                ("contact.normal_law", word),
+                ("contact.restitution", "0.8"),
+                ("contact.yield_speed", "20 mm/s"),
+                ("contact.impact_speed_floor", "0.1 mm/s"),
+                ("solver.method", method),
+                ("solver.step", "2 us"),
+                ("solver.steps_per_impact", "64"),
+            ];
+            // From wall to wall, slower each time: from 100 mm/s to where nothing yields.
+            let impacts = impacts(&mut axial_impact(&changes), 0.2);
+            let mut yielding = 0;
+            for impact in &impacts {
+                let speed = impact.approach_speed;
+                let asked = if speed > 0.02 { 0.8 * (0.02 / speed).powf(0.25) } else { 0.8 };
+                let given = undisturbed_restitution(law.damping_factor(asked));
+                assert!((impact.requested - asked).abs() < 1e-12, "{word} {method}: {impact:?}");
+                assert!((impact.law - given).abs() < 1e-12, "{word} {method}: {impact:?}");
+                assert!((impact.achieved() - given).abs() < 1e-3, "{word} {method}: {impact:?}");
+                yielding += usize::from(speed > 0.02);
+            }
+            println!("{word} {method}: {yielding} of {}", impacts.len());
+            assert!((3..impacts.len() - 1).contains(&yielding), "{word} {method}: {yielding} of {}", impacts.len());
+        }
+    }
+}
+
+#[test]
+fn a_yield_speed_above_all_impacts_changes_no_bit_and_needs_something_that_can_fall() {
+    for method in METHODS {
+        let [without, with] = ["0 m/s", "1 m/s"].map(|speed| {
+            let changes = [("contact.yield_speed", speed), ("solver.method", method)];
+            let mut simulation = simulation("spcmm", &changes);
+            simulation.advance_to(0.02).unwrap();
+            assert!(simulation.statistics().impacts() > 3);
+            simulation.state_hash()
+        });
+        assert_eq!(without, with, "{method}");
+    }
+    for (changes, words) in [
+        ([("contact.approach_speed", "largest")], "approach_speed"),
+        ([("contact.restitution", "1")], "restitution below 1"),
+        ([("contact.normal_law", "hertz")], "normal_law with damping"),
+    ] {
+        let all = [
+            ("contact.yield_speed".to_owned(), "10 mm/s".to_owned()),
+            (changes[0].0.to_owned(), changes[0].1.to_owned()),
+        ];
+        let error = jointplay_scene::Scene::load("spcmm", &all).expect_err(words).to_string();
+        assert!(error.contains(words) && error.contains("yield_speed") && error.contains("0 m/s"), "{error}");
+    }
+    // From now on.
+    let mut simulation = axial_impact(&[("contact.normal_law", "gonthier"), ("contact.restitution", "0.8")]);
+    assert_eq!(simulation.set("contact.yield_speed", "10 mm/s"), Ok(jointplay_physics::simulate::Effect::Now));
+    let first = impacts(&mut simulation, 0.02)[0];
+    assert!((first.requested - 0.8 * 0.1_f64.powf(0.25)).abs() < 1e-12, "{first:?}");
+}
+
+#[test]
 fn an_impact_reports_its_depth_force_and_time() {
     let mut simulation = axial_impact(&[("contact.normal_law", "hertz"), ("solver.tolerance", "1e-10")]);
     let first = impacts(&mut simulation, 0.01)[0];

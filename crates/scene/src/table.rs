@@ -92,7 +92,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 31] = [
+static TABLE: [Parameter; 32] = [
     contact_number!(
         clearance,
         "Clearance",
@@ -186,6 +186,14 @@ static TABLE: [Parameter; 31] = [
          the largest rate of the contact so far, which limits damping to that of an undisturbed impact; an \
          undisturbed impact is the same with both.",
         "Sheng & Chen (2024), eq. 19, the speed at the start of contact",
+    ),
+    contact_number!(
+        yield_speed,
+        "Yield speed",
+        logarithmic(D::Speed, 0.0, 1e3, "m/s", (1e-3, 10.0)),
+        "Approach speed above which parts yield, so that they rebound less: the restitution falls with the fourth root of the speed. \
+         With 0 it does not depend on the speed. Only for approach_speed start, a restitution below 1, and laws with damping.",
+        "Johnson (1985), Contact Mechanics",
     ),
     contact_choice!(
         normal_law,

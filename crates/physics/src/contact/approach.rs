@@ -21,10 +21,11 @@ pub enum ApproachBranch {
 }
 
 impl Coefficients {
-    /// Approach speed without a contact state, m/s: `rate`, but not below the floor.
+    /// Approach speed without a contact state, m/s: `rate`, but not below the floor, and lower where the parts yield.
     #[inline]
-    pub(super) fn with_floor(&self, rate: f64) -> f64 {
-        rate.max(self.speed_floor)
+    pub(crate) fn with_floor(&self, rate: f64) -> f64 {
+        let speed = rate.max(self.speed_floor);
+        if speed > self.yield_speed { self.yielding(speed) } else { speed }
     }
 
     /// Approach speed, m/s, for a stored value `stored` (m/s) and the penetration rate `rate` (m/s).

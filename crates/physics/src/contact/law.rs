@@ -151,8 +151,12 @@ pub fn undisturbed_restitution(chi: f64) -> f64 {
 pub struct Coefficients {
     /// Force, slope and energy by penetration.
     pub elastic: ElasticLaw,
-    /// Damping factor chi.
+    /// Damping factor chi, of impacts in which nothing yields.
     pub damping: f64,
+    /// Normal law and requested restitution, from which it is.
+    law: (NormalLaw, f64),
+    /// Approach speed above which the restitution falls, m/s; infinite if it does not.
+    pub(crate) yield_speed: f64,
     /// Coefficient of the modified Coulomb law; 0 under another law.
     pub friction: f64,
     /// Bristles of the bristle law.
@@ -181,6 +185,8 @@ impl Coefficients {
         Self {
             elastic: ElasticLaw::of_joint(parameters, clearance),
             damping: parameters.normal_law.damping_factor(parameters.restitution),
+            law: (parameters.normal_law, parameters.restitution),
+            yield_speed: if parameters.yield_speed > 0.0 { parameters.yield_speed } else { f64::INFINITY },
             friction: match parameters.friction_law {
                 FrictionLaw::ModifiedCoulomb => parameters.friction,
                 FrictionLaw::Bristle | FrictionLaw::None => 0.0,
@@ -195,6 +201,26 @@ impl Coefficients {
             clearance_rate: 0.0,
             uses_largest_rate: parameters.approach_speed == ApproachSpeed::Largest,
         }
+    }
+
+    /// Requested restitution of an impact at the approach speed `speed`, m/s. Above the yield speed it falls with the fourth root of it, as in
+    /// fully plastic impacts: K. L. Johnson, Contact Mechanics (1985).
+    pub fn restitution_at(&self, speed: f64) -> f64 {
+        let (_, restitution) = self.law;
+        if speed > self.yield_speed { restitution * (self.yield_speed / speed).sqrt().sqrt() } else { restitution }
+    }
+
+    /// Damping factor of an impact at this approach speed, m/s.
+    pub fn damping_at(&self, speed: f64) -> f64 {
+        if speed > self.yield_speed { self.law.0.damping_factor(self.restitution_at(speed)) } else { self.damping }
+    }
+
+    /// Speed over which the damping term of an impact at the approach speed `speed` has the damping factor of slow ones, m/s.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn yielding(&self, speed: f64) -> f64 {
+        let damping = self.damping_at(speed);
+        if damping > 0.0 { speed * self.damping / damping } else { speed }
     }
 
     /// Sets the current clearance of a ramp (m), its rate (m/s), and the corresponding elastic law.

@@ -151,6 +151,8 @@ pub struct Parameters {
     pub bristle_damping: f64,
     /// Requested restitution ce, 0..=1.
     pub restitution: f64,
+    /// Approach speed above which it falls, m/s; 0: it does not.
+    pub yield_speed: f64,
     /// Young's modulus E of both bodies, Pa.
     pub youngs_modulus: f64,
     /// Poisson's ratio nu of both bodies.
@@ -221,6 +223,7 @@ impl Parameters {
         bristle_stiffness: 1e8,
         bristle_damping: 2e3,
         restitution: 0.9,
+        yield_speed: 0.0,
         youngs_modulus: 206e9,
         poisson_ratio: 0.3,
         ball_radius: 0.010,

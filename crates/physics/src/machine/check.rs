@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use super::{Characteristic, Doubt, Drive, JointCoordinate, JointKind, LooseFault, LooseJoint, Machine, Warning};
-use crate::contact::{self, FrictionLaw, NormalLaw};
+use crate::contact::{self, ApproachSpeed, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
 use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
 use crate::units::{Dimension, format_quantity, unit_names};
@@ -519,6 +519,14 @@ pub enum ContactFault {
     /// A restitution of 0 under a law that divides by it.
     #[error("the law {0} divides by the restitution; allowed above 0 to 1; a pure number, no unit")]
     DividesByRestitution(NormalLaw),
+    /// A yield speed without a restitution that could fall.
+    #[error("yield_speed needs {needs}; allowed without it 0 m/s")]
+    Yield {
+        /// What is missing.
+        needs: &'static str,
+        /// Last part of its key.
+        key: &'static str,
+    },
     /// Impossible dimensions or settings of a joint with play.
     #[error("{0}")]
     Loose(#[from] LooseFault),
@@ -530,6 +538,7 @@ impl ContactFault {
         match self {
             Self::Clearance { .. } => ["clearance", "ball_radius"],
             Self::SlipSpeeds { .. } => ["slip_speed_low", "slip_speed_high"],
+            Self::Yield { key, .. } => ["yield_speed", key],
             Self::DividesByRestitution(_) => ["restitution", "normal_law"],
             Self::Loose(fault) => fault.parts(),
         }
@@ -554,6 +563,16 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
     }
     if contact.restitution == 0.0 && !contact.normal_law.damping_factor(0.0).is_finite() {
         return Err(ContactFault::DividesByRestitution(contact.normal_law));
+    }
+    let yields = contact.yield_speed > 0.0;
+    if yields && contact.approach_speed != ApproachSpeed::Start {
+        return Err(ContactFault::Yield { needs: "approach_speed = \"start\"", key: "approach_speed" });
+    }
+    if yields && contact.normal_law == NormalLaw::Hertz {
+        return Err(ContactFault::Yield { needs: "a normal_law with damping", key: "normal_law" });
+    }
+    if yields && contact.restitution == 1.0 {
+        return Err(ContactFault::Yield { needs: "a restitution below 1", key: "restitution" });
     }
     Ok(())
 }

@@ -265,11 +265,7 @@ impl DiscreteGradient {
                 clearances: start.clearances,
                 slip: start.slip,
                 bent: Vec3::zeros(),
-                approach: if contact_state.active {
-                    contact_state.approach_speed
-                } else {
-                    law.speed_floor.max(start.rate)
-                },
+                approach: if contact_state.active { contact_state.approach_speed } else { law.with_floor(start.rate) },
                 rebound: from.rebounds[j],
             };
             let mean = (end - start.eccentricity) / from.h;

@@ -33,7 +33,7 @@ pub struct Impact {
     pub approach_speed: f64,
     /// Minus the penetration rate when it ended, m/s.
     pub separation_speed: f64,
-    /// The joint's restitution setting when it began.
+    /// The restitution asked for at its approach speed.
     pub requested: f64,
     /// Restitution that its normal-force law predicts for an undisturbed impact not slower than the floor.
     pub law: f64,
@@ -201,8 +201,6 @@ pub(super) struct Onset {
     /// Penetration rate, m/s, and its rate of change before, m/s^2.
     pub speed: f64,
     pub push: f64,
-    /// Requested restitution.
-    pub requested: f64,
     /// Whether another contact touches that acts on the same bodies.
     pub among_others: bool,
 }
@@ -268,8 +266,9 @@ impl Impacts {
         }
         self.change(onset.contact, false, onset.time, events);
         let contact = &mut self.contacts[onset.contact];
-        if contact.law.0 != coefficients.damping {
-            contact.law = (coefficients.damping, undisturbed_restitution(coefficients.damping));
+        let damping = coefficients.damping_at(onset.speed);
+        if contact.law.0 != damping {
+            contact.law = (damping, undisturbed_restitution(damping));
         }
         if !(onset.speed > 0.0) {
             return;
@@ -279,7 +278,7 @@ impl Impacts {
             place: onset.place,
             start: onset.time,
             approach_speed: onset.speed,
-            requested: onset.requested,
+            requested: coefficients.restitution_at(onset.speed),
             law: contact.law.1,
             below_speed_floor: onset.speed < coefficients.speed_floor,
             disturbed: onset.among_others,

@@ -37,13 +37,12 @@ impl State {
         events: &mut ImpactEvents,
     ) -> ContactState {
         let j = contacts.joint_of(c);
-        let requested = self.conditions.joints[j].restitution;
         let coefficients = contacts.coefficients(c);
         let interacts = |other: ContactId| contacts.interact(c, other);
         let mut active = self.now.contact_states.iter().enumerate().filter(|(_, m)| m.active);
         let among_others = active.any(|(other, _)| interacts(other));
         let place = contacts.place(c);
-        let onset = Onset { contact: c, joint: j, place, time, speed: rate, push, requested, among_others };
+        let onset = Onset { contact: c, joint: j, place, time, speed: rate, push, among_others };
         self.record.impacts.begin(&onset, coefficients, interacts, events);
         let contact_state = ContactState::at_onset(coefficients, rate);
         self.record.statistics.joints[j].impacts += 1;

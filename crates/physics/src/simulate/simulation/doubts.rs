@@ -105,7 +105,12 @@ impl DoubtContext<'_> {
         let depth = |j: usize| self.state.worn(j).into_iter().fold(deepest(j), f64::max);
         let worn = self.worst(MAX_WORN, |j| depth(j) / size(j));
         doubts.extend(worn.map(|(joints, j)| Doubt::Worn { joints, depth: depth(j), size: size(j) }));
-        let usual = |j: usize| self.coefficients(j).damping;
+        // Where parts yield, that of the fastest of the latest impacts.
+        let fastest = |j: usize| {
+            let own = self.state.impacts().filter(|impact| impact.joint == j);
+            own.map(|impact| impact.approach_speed).fold(0.0, f64::max)
+        };
+        let usual = |j: usize| self.coefficients(j).damping_at(fastest(j));
         let damping = self.worst(MAX_DAMPING, |j| statistics.joints[j].damping - usual(j));
         doubts.extend(damping.map(|(joints, j)| Doubt::Damping {
             joints,
