@@ -154,7 +154,7 @@ pub struct Coefficients {
     /// Damping factor chi, of impacts in which nothing yields.
     pub damping: f64,
     /// Normal law and requested restitution, from which it is.
-    law: (NormalLaw, f64),
+    pub(crate) law: (NormalLaw, f64),
     /// Approach speed above which the restitution falls, m/s; infinite if it does not.
     pub(crate) yield_speed: f64,
     /// Coefficient of the modified Coulomb law; 0 under another law.
