@@ -296,8 +296,8 @@ fn cut(clearance: f64, depth: f64) -> f64 {
 
 #[test]
 fn a_steady_load_cuts_the_shape_of_the_pin() {
-    // A pin that turns under its weight sinks until its own circle and that of the bearing enclose what has worn off, and leans neither way:
-    // nothing rubs against it.
+    // A pin that turns under its weight sinks until its own circle and that of the bearing enclose what has worn off, and leans neither
+    // way: nothing rubs against it.
     for (method, ends) in METHODS.into_iter().flat_map(|method| ["pin", "bearing"].map(|ends| (method, ends))) {
         let text = replaced(PIN, "ends = \"pin\"", &format!("ends = \"{ends}\""));
         let changes = [("contact.wear_shape", "profile"), ("contact.wear_coefficient", "1e-7 m^2/N")];

@@ -203,8 +203,8 @@ impl Coefficients {
         }
     }
 
-    /// Requested restitution of an impact at the approach speed `speed`, m/s. Above the yield speed it falls with the fourth root of it, as in
-    /// fully plastic impacts: K. L. Johnson, Contact Mechanics (1985).
+    /// Requested restitution of an impact at the approach speed `speed`, m/s. Above the yield speed it falls with the fourth root of it, as
+    /// in fully plastic impacts: K. L. Johnson, Contact Mechanics (1985).
     pub fn restitution_at(&self, speed: f64) -> f64 {
         let (_, restitution) = self.law;
         if speed > self.yield_speed { restitution * (self.yield_speed / speed).sqrt().sqrt() } else { restitution }

@@ -1,10 +1,10 @@
 //! Surfaces of joints with play that wear.
 //!
 //! Archard (1953, J. Appl. Phys. 24, 981): what a contact removes in a time is k N |v|, with the normal force N and the sliding velocity v
-//! of the two surfaces. Flores (2009, Mech. Mach. Theory 44, 1211) has it in the clearance joints of multibody systems. Wear is even,
-//! with the volume taken off the whole surface that the play is between, so that its depth, volume over area, is what the play
-//! grows by, and walls stay spheres, cylinders and planes; or by direction (`mechanism/loose/profile.rs`). k is the sum of those of both parts, whose shares do not matter to the play.
-//! Depths are small against radii: the areas are those of the part inside, without the play.
+//! of the two surfaces. Flores (2009, Mech. Mach. Theory 44, 1211) has it in the clearance joints of multibody systems. Wear is even, with
+//! the volume taken off the whole surface that the play is between, so that its depth, volume over area, is what the play grows by, and
+//! walls stay spheres, cylinders and planes; or by direction (`mechanism/loose/profile.rs`). k is the sum of those of both parts, whose
+//! shares do not matter to the play. Depths are small against radii: the areas are those of the part inside, without the play.
 
 use std::f64::consts::PI;
 

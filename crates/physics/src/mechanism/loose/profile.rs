@@ -1,11 +1,11 @@
 //! A round wall that wears where it is touched: the depth worn off it as a function of direction.
 //!
 //! A ball of radius r at e from the middle of a wall of the radius r + c(n) overlaps it by e . n - c(n) in the direction n, to first order
-//! in c / r, and its penetration is the largest of these: delta = max (e . n - c0 - w(n)), with the worn depth w. Where it is largest, e minus
-//! the gradient of w lies along n. So the contact is that of an unworn wall whose centre is the point s = w n + grad w, fixed to the worn
-//! part: its penetration is delta, and its rate is that of delta, since s moves at right angles to n as n turns. Forces, moments and powers are
-//! those of the unworn wall, and the energy is a function of the configuration alone. Where a wall has worn on all sides by more than its play, a ball in
-//! the middle is nearer to s than to any wall: the middle then goes with it.
+//! in c / r, and its penetration is the largest of these: delta = max (e . n - c0 - w(n)), with the worn depth w. Where it is largest, e
+//! minus the gradient of w lies along n. So the contact is that of an unworn wall whose centre is the point s = w n + grad w, fixed to the
+//! worn part: its penetration is delta, and its rate is that of delta, since s moves at right angles to n as n turns. Forces, moments and
+//! powers are those of the unworn wall, and the energy is a function of the configuration alone. Where a wall has worn on all sides by more
+//! than its play, a ball in the middle is nearer to s than to any wall: the middle then goes with it.
 //!
 //! w is a sum of smooth bumps of equal shape about directions of even spacing, and the volume the sum of theirs. What a
 //! contact wears off is divided among them by overlap, as on an elastic foundation: c then tends to e . n, the wall of
@@ -61,8 +61,8 @@ pub struct Bumps {
 }
 
 impl Bumps {
-    /// Those of the place `place` of `joint`, an index among the names of its sites; `None` where its wall is not round, or does not wear by
-    /// direction.
+    /// Those of the place `place` of `joint`, an index among the names of its sites; `None` where its wall is not round, or does not wear
+    /// by direction.
     pub fn of(joint: &LooseJoint, place: u8) -> Option<Arc<Self>> {
         if !joint.wears_by_direction() {
             return None;
@@ -331,8 +331,8 @@ impl Profile {
         depths.iter().sum::<f64>() / depths.len() as f64
     }
 
-    /// The part from the middle of the wall at the latest evaluation, m, in the axes of the worn body, less the least radius of curvature along
-    /// the normal.
+    /// The part from the middle of the wall at the latest evaluation, m, in the axes of the worn body, less the least radius of curvature
+    /// along the normal.
     pub fn cut(&self) -> Vec3 {
         self.toward - self.normal * (self.bumps.tightest * self.toward.norm())
     }
@@ -425,8 +425,8 @@ impl Profile {
     }
 }
 
-/// Inverse of the symmetric `against` in the plane across `n`, or across both `n` and `axis`. Where the overlap has no largest value near `n`, in the
-/// middle of the wall, that of its size: the direction then climbs.
+/// Inverse of the symmetric `against` in the plane across `n`, or across both `n` and `axis`. Where the overlap has no largest value near
+/// `n`, in the middle of the wall, that of its size: the direction then climbs.
 fn inverse_across(against: &Mat3, n: &Vec3, axis: Option<&Vec3>) -> Mat3 {
     if let Some(axis) = axis {
         let along = axis.cross(n);

@@ -120,8 +120,8 @@ impl Simulation {
         restarted
     }
 
-    /// Begins anew, as [`Self::restart_at`], at the present state, with walls that have worn by direction to `walls`: of each of those of loose joint
-    /// `j` the depths of its bumps, m, as from [`State::profiles`].
+    /// Begins anew, as [`Self::restart_at`], at the present state, with walls that have worn by direction to `walls`: of each of those of
+    /// loose joint `j` the depths of its bumps, m, as from [`State::profiles`].
     ///
     /// # Errors
     /// Other walls, depths below 0, or parts deep in their walls; nothing has changed then.
