@@ -334,11 +334,12 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>, ends: [f64; 2]) -> Response {
 /// other focused control also the space bar. `turns_pages`: Page Up and Page Down are those of a presenter's remote, wherever the focus
 /// is.
 pub fn pressed(ctx: &egui::Context, turns_pages: bool) -> Vec<Action> {
-    // Esc has already taken the focus from a text field, and does nothing else.
+    // Esc has already taken the focus from a text field, or takes back what is dragged, and does nothing else.
     let typing = ctx.text_edit_focused();
     let before = Id::unique(TYPING_KEY).with(ctx.viewport_id());
     let typed = ctx.data_mut(|data| std::mem::replace(data.get_temp_mut_or_default::<bool>(before), typing));
-    if typing || (typed && ctx.input(|input| input.key_pressed(Key::Escape))) {
+    let dragged = ctx.dragged_id().or(ctx.drag_stopped_id()).is_some();
+    if typing || ((typed || dragged) && ctx.input(|input| input.key_pressed(Key::Escape))) {
         return Vec::new();
     }
     let focused = ctx.memory(egui::Memory::focused);

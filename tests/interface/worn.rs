@@ -175,15 +175,18 @@ fn what_the_slider_did_not_make_has_no_age() {
 fn the_handle_stops_where_the_scene_allows_no_more() {
     let mut harness = run_window("1e-10 m^2/N");
     let set = clearances(&harness);
+    harness.key_press(Key::L);
+    harness.run_steps(2);
+    assert!(shows_text(&harness, "Microscope"));
     let track = harness.get_by_role_and_label(Role::Slider, NAME).rect();
     harness.drag_at(track.left_center() + vec2(40.0, 0.0));
     harness.hover_at(track.right_center() - vec2(2.0, 0.0));
     harness.run_steps(3);
     assert!(shows_text(&harness, "No longer: S1 is as wide as the scene allows"));
-    // Esc takes the drag back.
+    // Esc takes the drag back, and does nothing else.
     harness.key_press(Key::Escape);
     harness.run_steps(3);
-    assert!(!shows_text(&harness, "No longer"));
+    assert!(!shows_text(&harness, "No longer") && shows_text(&harness, "Microscope"));
     harness.drop_at(track.right_center() - vec2(2.0, 0.0));
     harness.run_steps(3);
     assert_eq!(clearances(&harness), set);
@@ -239,6 +242,17 @@ fn it_is_absent_without_wear_and_comes_when_the_pointer_is_elsewhere() {
     harness.hover_at(picture);
     harness.run_steps(3);
     assert!(harness.query_by_label(NAME).is_none() && below(&harness) < before);
+}
+
+#[test]
+fn it_is_absent_where_walls_wear_by_direction() {
+    for (shape, shown) in [("even", true), ("profile", false)] {
+        let changes = [("contact.wear_coefficient", "1e-14 m^2/N"), ("contact.wear_shape", shape)];
+        let clock = crate::common::ticking_clock::<10>;
+        let mut harness = opened(SCENE, &changes, [1280.0, 800.0], egui::Theme::Light, clock);
+        harness.run_steps(3);
+        assert_eq!(harness.query_by_role_and_label(Role::Slider, NAME).is_some(), shown, "{shape}");
+    }
 }
 
 #[test]
