@@ -10,7 +10,6 @@ mod ledger;
 mod load_peaks;
 mod peaks;
 mod report;
-mod shared;
 mod simulation;
 mod stepper;
 mod stopped;

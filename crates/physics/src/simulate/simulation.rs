@@ -31,7 +31,6 @@ use std::sync::Arc;
 use super::impacts::{ImpactEvents, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
-use super::shared::Shared;
 use super::stepper::{ActiveScheme, AnyStepper};
 use super::{
     Doubt, Effect, Frame, Impact, ImpactEvent, Indeterminate, Ledger, LoadPeaks, Peak, StartError, Statistics, Stopped,
@@ -118,9 +117,8 @@ pub struct State {
     /// What each loose joint remembers, and each contact.
     joints: Vec<JointState>,
     contacts: Vec<ContactMemory>,
-    /// Of each contact whose wall wears by direction, the depths of its profile, m; empty for others. Copies of the state share those
-    /// that have not changed since.
-    profiles: Vec<Shared<f64>>,
+    /// Of each contact whose wall wears by direction, the depths of its profile, m; empty for others.
+    profiles: Vec<Vec<f64>>,
     /// The hand's pull, if any.
     pull: Option<Pull>,
     /// Flights of the bodies excluded from the latest step, indexed like the mechanism's free-flight bodies.

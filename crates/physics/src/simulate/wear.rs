@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::shared::Shared;
+use std::sync::Arc;
+
 use crate::machine::{LooseJoint, Machine};
 use crate::mechanism::{Division, Mechanism, Spot, WallContact};
 
@@ -29,7 +30,8 @@ impl Cell {
 struct Walls {
     division: Division,
     /// Empty for an ideal joint. Copies of the map share cells that have not changed since.
-    cells: Shared<Cell>,
+    #[serde(with = "shared")]
+    cells: Arc<[Cell]>,
 }
 
 /// A contact at a quadrature node of a step.
@@ -53,6 +55,23 @@ pub struct Wear {
     contacts: Vec<ContactSample>,
     /// Contributions of the latest step, by joint and cell, not yet added to the cells.
     latest: Vec<(usize, usize, Cell)>,
+}
+
+/// Serialises cells without their sharing.
+mod shared {
+    use std::sync::Arc;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::Cell;
+
+    pub(super) fn serialize<S: Serializer>(cells: &Arc<[Cell]>, to: S) -> Result<S::Ok, S::Error> {
+        cells[..].serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Arc<[Cell]>, D::Error> {
+        Vec::deserialize(from).map(Arc::from)
+    }
 }
 
 /// Largest number of entries per contact in one step: its nodes and one contact start.
@@ -104,7 +123,8 @@ impl Wear {
     /// Adds the contributions of the latest step to the cells.
     pub(super) fn commit_step(&mut self) {
         for (joint, cell, contribution) in self.latest.drain(..) {
-            self.joints[joint].cells.own()[cell].add(&contribution);
+            let cells = Arc::make_mut(&mut self.joints[joint].cells);
+            cells[cell].add(&contribution);
         }
     }
 

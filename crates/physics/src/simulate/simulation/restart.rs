@@ -139,7 +139,7 @@ impl Simulation {
         let contacts = self.workspace.mechanism.contacts.of_joint(j);
         let before = self.state.clone();
         let worn = self.state.profiles[contacts].iter_mut().filter(|depths| !depths.is_empty());
-        worn.zip(walls).for_each(|(depths, wall)| depths.own().copy_from_slice(wall));
+        worn.zip(walls).for_each(|(depths, wall)| depths.copy_from_slice(wall));
         let (time, y) = (self.state.time(), self.state.vector().to_vec());
         let restarted = self.try_restart(time, &y);
         if restarted.is_err() {

@@ -12,7 +12,6 @@ use crate::mechanism::{ContactId, Flight, Mechanism, Pull, Worn, WornWall};
 use crate::simulate::impacts::{ForcePeak, Impact, Impacts};
 use crate::simulate::ledger::{Account, Ledger};
 use crate::simulate::peaks::{Approach, Recent};
-use crate::simulate::shared::Shared;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
 use crate::simulate::{Peak, Statistics, Wear};
 
@@ -31,8 +30,8 @@ impl JointState {
 }
 
 /// Depths of the profile of contact `c` at the start; none if it has none.
-fn unworn(mechanism: &Mechanism, c: ContactId) -> Shared<f64> {
-    vec![0.0; mechanism.contacts.profile(c).map_or(0, |profile| profile.bumps().len())].into()
+fn unworn(mechanism: &Mechanism, c: ContactId) -> Vec<f64> {
+    vec![0.0; mechanism.contacts.profile(c).map_or(0, |profile| profile.bumps().len())]
 }
 
 impl ContactMemory {
@@ -186,7 +185,7 @@ impl State {
     pub fn profiles(&self, j: usize) -> impl Iterator<Item = &[f64]> + Clone {
         let first: usize = self.joints[..j].iter().map(|joint| joint.contacts).sum();
         let own = &self.profiles[first..first + self.joints[j].contacts];
-        own.iter().map(|depths| &**depths).filter(|depths| !depths.is_empty())
+        own.iter().map(Vec::as_slice).filter(|depths| !depths.is_empty())
     }
 
     /// The walls of loose joint `j` of `machine` that wear by direction.
@@ -304,7 +303,7 @@ impl State {
         FIXED
             + turns
             + wear
-            + self.profiles.iter().map(|depths| size_of_val(&**depths)).sum::<usize>()
+            + self.profiles.iter().map(|depths| size_of_val(depths.as_slice())).sum::<usize>()
             + flights
             + self.elements.bytes()
             + coordinates * COPIES * size_of::<f64>()

@@ -143,7 +143,7 @@ impl Stepping<'_> {
             moved = true;
             let clearance = mechanism.contacts.clearance(c);
             if let Some(profile) = mechanism.contacts.profile(c) {
-                let depths = state.profiles[c].own();
+                let depths = &mut state.profiles[c];
                 for Rub { depth, toward, penetration } in rubs.iter().filter(|rub| rub.depth > 0.0) {
                     profile.bumps().deposit(depths, *depth, [clearance, *penetration], toward);
                 }
