@@ -285,7 +285,8 @@ def wear(
     stays below `tolerance`; a given one is kept.
 
     Each run starts from the start of the scene, whose clearances are wider by what has worn off, or its walls deeper where they wear by
-    direction: that is the state of a run in which the walls have worn, but for the stiffness of collars that touch, which is that of the radial play at the start of a run. Forces are the
+    direction: that is the state of a run in which the walls have worn, but for the stiffness of collars that touch, which is that of the
+    radial play at the start of a run. Forces are the
     largest at `rows` rows of each period and of the impacts between them. A jump is shortened a few times at most: where rates scatter
     from run to run, only more periods to `observe` help, and a `DoubtWarning` says so. A run that stops raises `Stopped`. `progress` is
     called with the fraction done, from 0 to 1.

@@ -315,6 +315,22 @@ fn a_steady_load_cuts_the_shape_of_the_pin() {
 }
 
 #[test]
+fn a_bearing_far_from_the_origin_wears_as_at_it() {
+    let changes = [("contact.wear_shape", "profile"), ("contact.wear_coefficient", "1e-7 m^2/N")];
+    let far = |point: &str| replaced(PIN, "axis = [1, 0, 0]", &format!("axis = [1, 0, 0]\nparent_point = \"{point}\""));
+    for method in METHODS {
+        let deepest = |text: &str| {
+            let simulation = run_by(method, text, &changes, 0.02);
+            assert!(simulation.ledger().unwrap().share() < 1e-5, "{method}");
+            simulation.state().worn_walls(simulation.machine(), 0)[0].deepest()
+        };
+        let (here, there) = (deepest(PIN), deepest(&far("1000 -500 300 m")));
+        println!("{method}: {here:e} {:e}", there / here - 1.0);
+        assert!((there / here - 1.0).abs() < 1e-4, "{method}: {here:e} {there:e}");
+    }
+}
+
+#[test]
 fn steps_longer_than_an_impact_wear_too() {
     let changes = [("solver.steps_per_impact", "2"), ("contact.wear_shape", "profile")];
     let text = replaced(KINDS, "radial = \"0.1 mm\"", "radial = \"0.002 mm\"")

@@ -461,6 +461,18 @@ mod tests {
         [(Bumps::on_sphere(), None), (Bumps::on_ring(&Mat3::identity(), 72), Some(Vec3::z()))]
     }
 
+    /// A wall worn to `depths`, a bore about `axis` if there is one.
+    fn worn(bumps: Bumps, axis: Option<Vec3>, depths: &[f64]) -> Profile {
+        let anchor = Anchor { body: 0, offset: Vec3::zeros() };
+        let wall = axis.map_or(Wall::Socket, |axis| Wall::Bore(axis, Edge::Pin));
+        let (stiffness, carrier, carried) = (Stiffness::Joint(1.0), anchor, anchor);
+        let site = Site { joint: 0, carrier, carried, wall, play: 0, stiffness, is_reversed: false, place: 0 };
+        let mut profile = Profile::new(site, Arc::new(bumps));
+        profile.continue_from(f64::NEG_INFINITY, depths);
+        profile.choose(0.0);
+        profile
+    }
+
     /// A fixed sequence of unit vectors, across `axis` if there is one.
     fn directions(axis: Option<Vec3>, count: u32) -> impl Iterator<Item = Vec3> {
         (1..=count).map(move |i| {
@@ -556,22 +568,7 @@ mod tests {
         for ((bumps, axis), tolerance) in bumps().into_iter().zip([0.02, 2e-5]) {
             let (shift, mean) = (Vec3::new(2e-5, -1e-5, 0.0), 3e-5);
             let depths: Vec<f64> = bumps.directions.iter().map(|at| mean + at.dot(&shift) / bumps.smoothing).collect();
-            let anchor = Anchor { body: 0, offset: Vec3::zeros() };
-            let wall = axis.map_or(Wall::Socket, |axis| Wall::Bore(axis, Edge::Pin));
-            let stiffness = Stiffness::Joint(1.0);
-            let site = Site {
-                joint: 0,
-                carrier: anchor,
-                carried: anchor,
-                wall,
-                play: 0,
-                stiffness,
-                is_reversed: false,
-                place: 0,
-            };
-            let mut profile = Profile::new(site, Arc::new(bumps));
-            profile.continue_from(f64::NEG_INFINITY, &depths);
-            profile.choose(0.0);
+            let mut profile = worn(bumps, axis, &depths);
             for n in directions(axis, 50) {
                 profile.toward = n * 1.5e-4;
                 let s = profile.find_shift(axis.as_ref());
@@ -590,22 +587,7 @@ mod tests {
     fn the_normal_and_the_penetration_follow_the_part() {
         for (bumps, axis) in bumps() {
             let depths: Vec<f64> = bumps.directions.iter().map(|at| 4e-5 * (at.x + 0.5 * at.y).max(0.0)).collect();
-            let anchor = Anchor { body: 0, offset: Vec3::zeros() };
-            let wall = axis.map_or(Wall::Socket, |axis| Wall::Bore(axis, Edge::Pin));
-            let stiffness = Stiffness::Joint(1.0);
-            let site = Site {
-                joint: 0,
-                carrier: anchor,
-                carried: anchor,
-                wall,
-                play: 0,
-                stiffness,
-                is_reversed: false,
-                place: 0,
-            };
-            let mut profile = Profile::new(site, Arc::new(bumps));
-            profile.continue_from(f64::NEG_INFINITY, &depths);
-            profile.choose(0.0);
+            let mut profile = worn(bumps, axis, &depths);
             let mut at = |toward: Vec3| {
                 profile.toward = toward;
                 let apart = toward - profile.find_shift(axis.as_ref());

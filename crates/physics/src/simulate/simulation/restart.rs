@@ -112,12 +112,7 @@ impl Simulation {
             return Err(RestartError::NotFinite { index, value: y[index] });
         }
         let before = self.state.clone();
-        let restarted = self.try_restart(time, y);
-        if restarted.is_err() {
-            self.state = before;
-            self.workspace.attach_to(&self.model, &mut self.state);
-        }
-        restarted
+        self.restart_or_return(before, time, y)
     }
 
     /// Begins anew, as [`Self::restart_at`], at the present state, with walls that have worn by direction to `walls`: of each of those of
@@ -141,7 +136,12 @@ impl Simulation {
         let worn = self.state.profiles[contacts].iter_mut().filter(|depths| !depths.is_empty());
         worn.zip(walls).for_each(|(depths, wall)| depths.copy_from_slice(wall));
         let (time, y) = (self.state.time(), self.state.vector().to_vec());
-        let restarted = self.try_restart(time, &y);
+        self.restart_or_return(before, time, &y)
+    }
+
+    /// Begins anew at (`time`, `y`), or returns to `before`.
+    fn restart_or_return(&mut self, before: State, time: f64, y: &[f64]) -> Result<(), RestartError> {
+        let restarted = self.try_restart(time, y);
         if restarted.is_err() {
             self.state = before;
             self.workspace.attach_to(&self.model, &mut self.state);
