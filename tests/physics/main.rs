@@ -30,6 +30,7 @@ mod endurance;
 mod energy;
 mod equilibrium;
 mod extremes;
+mod films;
 mod flights;
 mod formulations;
 mod guard;

@@ -48,6 +48,8 @@ pub enum Dimension {
     TurningDamping,
     /// Worn volume by force and distance; m^2/N
     Wear,
+    /// Pa s
+    Viscosity,
 }
 
 /// Why a text is not a quantity of the required dimension.
@@ -90,7 +92,7 @@ use Scale::{Decimal, Ratio};
 type Unit = (&'static str, Scale);
 
 /// Every dimension with its name and its units; the first unit is the SI one.
-const UNITS: [(Dimension, &str, &[Unit]); 20] = [
+const UNITS: [(Dimension, &str, &[Unit]); 21] = [
     (
         Dimension::Length,
         "length",
@@ -183,6 +185,7 @@ const UNITS: [(Dimension, &str, &[Unit]); 20] = [
         "wear coefficient",
         &[("m^2/N", Decimal(0)), ("mm^2/N", Decimal(-6)), ("mm^3/(N m)", Decimal(-9)), ("1/Pa", Decimal(0))],
     ),
+    (Dimension::Viscosity, "viscosity", &[("Pa s", Decimal(0)), ("mPa s", Decimal(-3)), ("cP", Decimal(-3))]),
     (Dimension::None, "pure number", &[]),
 ];
 
@@ -280,6 +283,7 @@ pub fn powers(dimension: Dimension) -> [i8; 4] {
         Dimension::TurningStiffness => [1, 2, -2, -1],
         Dimension::TurningDamping => [1, 2, -1, -1],
         Dimension::Wear => [-1, 1, 2, 0],
+        Dimension::Viscosity => [1, -1, -1, 0],
     }
 }
 

@@ -675,6 +675,7 @@ fn enters_squared(dimension: Dimension) -> bool {
             | Dimension::TurningStiffness
             | Dimension::TurningDamping
             | Dimension::Wear
+            | Dimension::Viscosity
     )
 }
 

@@ -9,13 +9,14 @@ use super::instance::Instance;
 use super::key::{FileKey, FileTable, MAX_SI, ValueType, at_most, key, number};
 use super::placement::{ATTACHMENT, ROTATION, read_attachment, read_rotation};
 use super::points::{Axis, Graph, MAX_POINTS, read_file, read_points};
-use super::read_joints::read_coordinate;
+use super::read_joints::{allowed_joints, read_coordinate};
 use super::*;
 use jointplay_physics::interpolate::Interpolation;
 use jointplay_physics::machine::{
-    Bushing, Characteristic, Drive, Element, ElementKind, Harmonic, JointCoordinate, JointSpring, Load, LoadAxes,
-    Motor, Quat, Spring, SpringSide, Stop, Tyre, Vec3,
+    Bushing, Characteristic, Drive, Element, ElementKind, Film, Harmonic, JointCoordinate, JointSpring, Load, LoadAxes,
+    LooseKind, Motor, Quat, Spring, SpringSide, Stop, Tyre, Vec3,
 };
+use jointplay_physics::suggest::nearest;
 use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
 
@@ -31,6 +32,7 @@ pub(super) static ELEMENTS: LazyLock<Vec<(&FileTable, ReadKind)>> = LazyLock::ne
         (&BUSHING, read_bushing),
         (&MOTOR, read_motor),
         (&TYRE, read_tyre),
+        (&FILM, read_film),
     ]
 });
 
@@ -320,6 +322,31 @@ static TYRE: LazyLock<FileTable> = LazyLock::new(|| {
     )
 });
 
+static FILM: FileTable = FileTable::new(
+    "film",
+    "[[film]]",
+    "lubricant between ball and socket, or pin and bearing, of a joint with play, beside its contacts",
+    &[
+        NAME,
+        joint("the joint that it is in: spherical, revolute or cylindrical with play"),
+        key(
+            "viscosity",
+            ValueType::Number(D::Viscosity, (0.0, 1e6)),
+            "\"100 mPa s\"",
+            "its dynamic viscosity: that of oils is 10 to 500 mPa s, that of water 1 mPa s",
+        ),
+        key(
+            "thickness",
+            ValueType::Number(D::Length, (1e-9, 1e-3)),
+            "\"1 um\"",
+            "thickness below which it does not fall, about the roughness of both surfaces: there dry contact takes over",
+        )
+        .default_value(1e-6),
+        key("length", ValueType::Number(D::Length, (1e-6, 1e3)), "\"20 mm\"", "its length along a pin; a ball has none")
+            .default_text("`length` of the joint's `play`"),
+    ],
+);
+
 /// Attachment of an element, and the section with its other keys.
 pub(super) struct ElementReader<'s, 'd> {
     section: &'s Section<'d>,
@@ -608,6 +635,43 @@ fn read_tyre(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> 
     Ok(ElementKind::Tyre(tyre))
 }
 
+fn read_film(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
+    let node = reader.section.require("joint")?;
+    let name = &*node.joint()?;
+    let joints = || reader.scene.machine.loose_joints.iter();
+    let holds = |kind: &LooseKind| !matches!(kind, LooseKind::Slide(_));
+    let found = joints().enumerate().find(|(_, joint)| joint.name == name);
+    let Some((index, joint)) = found.filter(|(_, joint)| holds(&joint.kind)) else {
+        let wrong = match found {
+            Some(_) => "a block in its guide holds no film".to_owned(),
+            None => "no such joint with play".to_owned(),
+        };
+        let names = || joints().filter(|joint| holds(&joint.kind)).map(|joint| joint.name.as_str());
+        return Err(node.error(format!(
+            "{wrong}{}; {}",
+            nearest(name, names()),
+            allowed_joints(names(), "ball or pin with play")
+        )));
+    };
+    let length = reader.section.get("length").map(|_| reader.number("length")).transpose()?;
+    match joint.kind {
+        LooseKind::Pin(pin) if pin.length.or(length).is_none() => {
+            return reader.fault("length", "missing; a pin that stays in its plane has none of its own");
+        }
+        LooseKind::Pin(_) => {}
+        LooseKind::Ball | LooseKind::Slide(_) => {
+            reader.section.refuse("length", "a film around a ball has the size of that")?;
+        }
+    }
+    Ok(ElementKind::Film(Film {
+        joint: index,
+        between: [joint.carrier(), joint.carried()],
+        viscosity: reader.number("viscosity")?,
+        thickness: reader.number("thickness")?,
+        length,
+    }))
+}
+
 /// Unit vector against gravity; `None` if gravity is 0.
 fn up_of(scene: &Scene) -> Option<Vec3> {
     let gravity = scene.machine.gravity;
@@ -642,7 +706,7 @@ pub(super) fn read_element<'d>(
         _ => {}
     }
     let mut coordinate = None;
-    if table.key("joint", None).is_some() {
+    if table.key("coordinate", None).is_some() {
         let (index, freedom) = read_coordinate(&section, scene, joints)?;
         let mut of = scene.machine.kinematic_joints().skip(index);
         let of = of.next().expect("a joint of the scene");

@@ -280,6 +280,19 @@ pub(super) fn sort_forest(
     Ok((sorted_bodies.into_iter().map(|(_, body)| body).collect(), sorted_joints))
 }
 
+/// What an error says of the joints that a key may name; `kind` is what they are.
+pub(super) fn allowed_joints<'n>(names: impl Iterator<Item = &'n str>, kind: &str) -> String {
+    const LISTED: usize = 12;
+    let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
+    if listed.len() > LISTED {
+        listed[LISTED] = "…";
+    }
+    match listed.is_empty() {
+        true => format!("the scene has no {kind}"),
+        false => format!("allowed {}", listed.join(", ")),
+    }
+}
+
 /// Resolves the keys `joint` and `coordinate` to a joint's index among the kinematic joints of `scene` and its coordinate.
 /// `joints` maps names to these indices.
 pub(super) fn read_coordinate(
@@ -287,7 +300,6 @@ pub(super) fn read_coordinate(
     scene: &Scene,
     joints: &BTreeMap<String, usize>,
 ) -> Result<(usize, Freedom), SceneError> {
-    const LISTED: usize = 12;
     let node = section.require("joint")?;
     let name = &*node.joint()?;
     let found = joints.get(name).copied();
@@ -301,14 +313,7 @@ pub(super) fn read_coordinate(
         let moving = scene.machine.kinematic_joints().filter(|joint| !joint.kind.freedoms().is_empty());
         let names = moving.map(|joint| joint.name.as_str());
         let near = nearest(name, names.clone());
-        let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
-        if listed.len() > LISTED {
-            listed[LISTED] = "…";
-        }
-        let allowed = match listed.is_empty() {
-            true => "the scene has no joint that slides or turns".to_owned(),
-            false => format!("allowed {}", listed.join(", ")),
-        };
+        let allowed = allowed_joints(names, "joint that slides or turns");
         return Err(node.error(format!("{wrong}{near}; {allowed}")));
     };
     let words: Vec<&str> = freedoms.iter().map(|freedom| freedom.word()).collect();

@@ -35,6 +35,8 @@ pub enum ElementNumber {
     TorqueX,
     TorqueY,
     TorqueZ,
+    /// Of a film, Pa s.
+    Viscosity,
 }
 
 words!(ElementNumber {
@@ -53,6 +55,7 @@ words!(ElementNumber {
     TorqueX => "torque_x",
     TorqueY => "torque_y",
     TorqueZ => "torque_z",
+    Viscosity => "viscosity",
 });
 
 /// Why a number of an element was not set.
@@ -204,7 +207,7 @@ impl ElementNumber {
     /// Least value that it may have.
     fn least(self) -> f64 {
         match self {
-            Self::Stiffness | Self::Damping | Self::Limit | Self::Length => 0.0,
+            Self::Stiffness | Self::Damping | Self::Limit | Self::Length | Self::Viscosity => 0.0,
             _ => -LARGEST,
         }
     }
@@ -243,6 +246,7 @@ impl Element {
                 N::TorqueZ => Some(&mut load.torque.z),
                 _ => None,
             },
+            ElementKind::Film(film) => (number == N::Viscosity).then_some(&mut film.viscosity),
             ElementKind::Stop(_) | ElementKind::Bushing(_) | ElementKind::Tyre(_) => None,
         }
     }

@@ -2,7 +2,9 @@
 
 use std::cmp::Ordering;
 
-use super::{Characteristic, Doubt, Drive, JointCoordinate, JointKind, LooseFault, LooseJoint, Machine, Warning};
+use super::{
+    Characteristic, Doubt, Drive, ElementKind, JointCoordinate, JointKind, LooseFault, LooseJoint, Machine, Warning,
+};
 use crate::contact::{self, ApproachSpeed, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
 use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
@@ -60,6 +62,12 @@ pub enum MachineFault {
     /// A joint does not have this coordinate.
     #[error("force element {element} acts on a coordinate that no joint has")]
     NoCoordinate {
+        /// Name of the element.
+        element: String,
+    },
+    /// A film that is in no ball or pin with a size.
+    #[error("film {element} is in no joint with play that holds one: a ball, or a pin with a length")]
+    NoFilm {
         /// Name of the element.
         element: String,
     },
@@ -189,6 +197,11 @@ impl Machine {
             };
             if element.coordinate().is_some_and(|on| !has(on)) {
                 return Err(MachineFault::NoCoordinate { element: element.name.clone() });
+            }
+            if let ElementKind::Film(film) = &element.kind
+                && !film.is_held(self)
+            {
+                return Err(MachineFault::NoFilm { element: element.name.clone() });
             }
             element.points(self).iter().try_for_each(|point| exists(&element.name, point.body))?;
         }

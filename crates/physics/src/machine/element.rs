@@ -1,7 +1,7 @@
 //! Force elements: springs, loads, stops and others that load bodies without a constraint. Their physics is in
 //! `mechanism/elements`, one file for each kind.
 
-use super::{Attachment, Drive, Freedom, Machine, Quat, Vec3};
+use super::{Attachment, Drive, Freedom, LooseJoint, LooseKind, Machine, Quat, Vec3};
 use crate::interpolate::Interpolation;
 use crate::words::words;
 
@@ -32,6 +32,8 @@ pub enum ElementKind {
     Motor(Motor),
     /// Tyre of a wheel on ground that may move.
     Tyre(Tyre),
+    /// Lubricant in a joint with play.
+    Film(Film),
 }
 
 /// Joint coordinate on which an element acts.
@@ -184,6 +186,21 @@ pub struct Tyre {
     pub height: f64,
 }
 
+/// Film of a lubricant between ball and socket, or pin and bearing, of a joint with play; without effect while that is ideal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Film {
+    /// Index of the joint among [`super::Machine::loose_joints`].
+    pub joint: usize,
+    /// Points of that joint on its carrier and on the carried part.
+    pub between: [Attachment; 2],
+    /// Dynamic viscosity, Pa s.
+    pub viscosity: f64,
+    /// Thickness that the film does not fall below, as the surfaces are rough, m.
+    pub thickness: f64,
+    /// Length of the film along a pin, m; `None` for that of the joint.
+    pub length: Option<f64>,
+}
+
 /// Axes in which a load is defined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LoadAxes {
@@ -252,6 +269,23 @@ impl Characteristic {
         let next = next.clamp(1, points.len() - 1);
         let ([x0, y0], [x1, y1]) = (points[next - 1], points[next]);
         y0 - x0 * (y1 - y0) / (x1 - x0)
+    }
+}
+
+impl Film {
+    /// Whether its joint can hold it, and its numbers are a film's.
+    pub(super) fn is_held(&self, machine: &Machine) -> bool {
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let holds = |joint: &LooseJoint| match joint.kind {
+            LooseKind::Ball => self.length.is_none(),
+            LooseKind::Pin(pin) => self.length.or(pin.length).is_some_and(positive),
+            LooseKind::Slide(_) => false,
+        };
+        let joint = machine.loose_joints.get(self.joint);
+        joint.is_some_and(|joint| holds(joint) && self.between == [joint.carrier(), joint.carried()])
+            && self.viscosity >= 0.0
+            && self.viscosity.is_finite()
+            && positive(self.thickness)
     }
 }
 
@@ -325,6 +359,7 @@ impl Element {
                 law: tyre.ground.as_ref().map(|ground| ("ground", ground)),
                 ..of("tyre", Place::Point(tyre.on))
             },
+            ElementKind::Film(film) => of("film", Place::Between(film.between)),
         }
     }
 
@@ -334,9 +369,11 @@ impl Element {
             ElementKind::Load(load) => load.factor.as_mut(),
             ElementKind::Motor(motor) => motor.target.as_mut(),
             ElementKind::Tyre(tyre) => tyre.ground.as_mut(),
-            ElementKind::Spring(_) | ElementKind::JointSpring(_) | ElementKind::Stop(_) | ElementKind::Bushing(_) => {
-                None
-            }
+            ElementKind::Spring(_)
+            | ElementKind::JointSpring(_)
+            | ElementKind::Stop(_)
+            | ElementKind::Bushing(_)
+            | ElementKind::Film(_) => None,
         }
     }
 

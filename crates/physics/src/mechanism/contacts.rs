@@ -120,6 +120,13 @@ struct JointContacts {
 }
 
 impl JointContacts {
+    /// Size of a play, m, and its rate, m/s, at `t`.
+    fn play_at(&self, play: usize, t: f64) -> (f64, f64) {
+        let (set, ramp_rate) = self.ramps[play].map_or((self.plays[play], 0.0), |ramp| ramp.at(t));
+        let (worn, wear_rate) = self.wearing.at(play, t);
+        (set + worn, ramp_rate + wear_rate)
+    }
+
     /// Whether a play changes by more than a change of parameters.
     fn moves(&self) -> bool {
         self.ramps != [None; 2] || self.wearing.worn != [[Worn::default(); 2]; 2]
@@ -283,6 +290,11 @@ impl Contacts {
         self.of_play(j, play).next().map_or(0.0, |c| self.clearance(c))
     }
 
+    /// Size of the first play of loose joint `j` at `t`, m.
+    pub(super) fn clearance_at(&self, j: usize, t: f64) -> f64 {
+        self.joints[j].play_at(0, t).0
+    }
+
     /// Sets the parameters of joint `j`, its plays without wear, m, and their ramps, and the worn depths from the time `t` on.
     pub(crate) fn set_joint(
         &mut self,
@@ -391,9 +403,7 @@ impl Contacts {
         for joint in self.joints.iter().filter(|joint| joint.moves()) {
             for contact in &mut self.contacts[joint.contacts.clone()] {
                 let Contact { site, law, .. } = contact;
-                let (set, ramp_rate) = joint.ramps[site.play].map_or((joint.plays[site.play], 0.0), |ramp| ramp.at(t));
-                let (worn, wear_rate) = joint.wearing.at(site.play, t);
-                let (clearance, rate) = (set + worn, ramp_rate + wear_rate);
+                let (clearance, rate) = joint.play_at(site.play, t);
                 if (clearance, rate) != (law.clearance, law.clearance_rate) {
                     site.stiffness.set_clearance(law, &joint.parameters, clearance, rate);
                 }

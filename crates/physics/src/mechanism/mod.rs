@@ -72,7 +72,7 @@ use std::sync::Arc;
 use crate::contact::{ContactState, FrictionBranch};
 use crate::machine::{Formulation, LiveElements, Machine, MachineFault, Mat3, StartRule, Vec3};
 use crate::units::format_quantity_digits;
-use elements::{ForceElement, element_of, elements_of};
+use elements::{FilmPlace, ForceElement, element_of, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
 use forest::Forest;
 use lagrange::Lagrange;
@@ -349,6 +349,8 @@ pub struct Mechanism {
     live: LiveElements,
     /// Number of the scene's elements.
     scene_elements: usize,
+    /// Those that are films in joints with play, by joint.
+    films: Vec<FilmPlace>,
     pull: Option<Pull>,
     turns: Turns,
     /// World gravity, m/s^2.
@@ -429,6 +431,7 @@ impl Mechanism {
             element_laws: machine.elements.iter().map(drives::law_of).collect(),
             live: LiveElements::default(),
             scene_elements: machine.elements.len(),
+            films: FilmPlace::all(machine),
             pull: None,
             turns: Turns::new(machine, &model),
             latest: Latest::Unknown,
@@ -825,6 +828,16 @@ impl Mechanism {
         }
     }
 
+    /// Films in joints with play.
+    pub(crate) fn films(&self) -> &[FilmPlace] {
+        &self.films
+    }
+
+    /// Whether a film is in loose joint `j`, which has play.
+    pub(crate) fn has_film(&self, j: usize) -> bool {
+        self.films.binary_search_by_key(&j, |film| film.joint).is_ok()
+    }
+
     /// The hand's pull, if any.
     pub fn pull(&self) -> Option<Pull> {
         self.pull
@@ -869,6 +882,11 @@ impl Mechanism {
             let element = self.live.element(machine, i);
             let next = element_of(machine, &self.model, &element);
             self.element_laws[i] = drives::law_of(&element);
+            if let Some(film) = FilmPlace::of(machine, i, &element)
+                && let Some(own) = self.films.iter_mut().find(|own| own.element == i)
+            {
+                *own = film;
+            }
             let motion = self.equations.motion();
             other_ends |= next.ends(motion).is_some() != self.elements[i].ends(motion).is_some();
             self.elements[i] = next;

@@ -48,7 +48,7 @@ impl Evaluator<'_> {
 
     /// Motion and contact forces at (t, y), without accelerations.
     fn load(&mut self, t: f64, y: &[f64]) {
-        let Mechanism { model, equations, contacts, elements, turns, latest, .. } = &mut *self.mechanism;
+        let Mechanism { model, equations, contacts, elements, films, turns, latest, .. } = &mut *self.mechanism;
         *latest = Latest::Unknown;
         equations.update_active(model, t, y);
         turns.follow(elements, &**equations, model, (t, y));
@@ -58,6 +58,9 @@ impl Evaluator<'_> {
         let at = At { t, motion, active_set: self.active_set, bristles };
         let mut loads = Loads { wrench, counts: &mut self.counts, has_left_branch: &mut *self.has_left_branch };
         contacts.load(&at, &mut loads);
+        for film in &**films {
+            elements[film.element].set_clearance(contacts.clearance_at(film.joint, t));
+        }
         for element in elements {
             element.load(&at, &mut loads);
         }

@@ -5,6 +5,7 @@ mod bushing;
 mod characteristic;
 mod contact;
 mod coordinate;
+mod film;
 mod joint_spring;
 mod load;
 mod motor;
@@ -27,6 +28,7 @@ use crate::machine::{self, Attachment, Element, ElementKind, JointCoordinate, Lo
 use bushing::Bushing;
 pub(super) use coordinate::AngleReference;
 use coordinate::{Coordinate, OnCoordinate};
+use film::Film;
 use joint_spring::JointSpring;
 use load::Load;
 use motor::Motor;
@@ -315,6 +317,9 @@ pub(super) trait ForceElement: Send + Sync {
     /// coordinate, which counts turns, although it measures poses.
     fn set_angle_reference(&mut self, _reference: AngleReference) {}
 
+    /// Sets the clearance of the joint in which it is, m, if it is in one.
+    fn set_clearance(&mut self, _clearance: f64) {}
+
     /// Its report at `t`; empty for a joint with play, which is reported as a joint.
     fn report(&self, _t: f64, _motion: &[Kinematics]) -> ElementReport {
         ElementReport::default()
@@ -324,6 +329,39 @@ pub(super) trait ForceElement: Send + Sync {
 /// The force elements of `machine`, in the order of the scene.
 pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn ForceElement>> {
     machine.elements.iter().map(|element| element_of(machine, model, element)).collect()
+}
+
+/// A film in a joint that has play now.
+#[derive(Clone, Copy, Debug)]
+pub struct FilmPlace {
+    /// Index of the element.
+    pub(super) element: usize,
+    /// Index of the loose joint.
+    pub joint: usize,
+    /// Least thickness, m.
+    pub thickness: f64,
+}
+
+impl FilmPlace {
+    /// All of `machine`, by joint.
+    pub(super) fn all(machine: &Machine) -> Vec<Self> {
+        let elements = machine.elements.iter().enumerate();
+        let mut films: Vec<Self> = elements.filter_map(|(i, element)| Self::of(machine, i, element)).collect();
+        films.sort_by_key(|film| film.joint);
+        films
+    }
+
+    /// That of element `index`, if it is one.
+    pub(super) fn of(machine: &Machine, index: usize, element: &Element) -> Option<Self> {
+        match element.kind {
+            ElementKind::Film(machine::Film { joint, thickness, .. })
+                if machine.loose_joints[joint].contact.clearance > 0.0 =>
+            {
+                Some(Self { element: index, joint, thickness })
+            }
+            _ => None,
+        }
+    }
 }
 
 /// The force element for `element`, of `machine` or in place of one of its own.
@@ -343,6 +381,7 @@ pub(super) fn element_of(machine: &Machine, model: &Model, element: &Element) ->
             Box::new(OnCoordinate { on: coordinate(motor.on), law: Motor { motor: motor.clone(), target: law } })
         }
         ElementKind::Tyre(tyre) => Box::new(Tyre::new(tyre, anchor(&tyre.on), law)),
+        ElementKind::Film(film) => Box::new(Film::new(film, machine, model)),
     }
 }
 

@@ -5,6 +5,7 @@
 //!   [`SLOW`], and without regard to its duration below the floor of the approach speed;
 //! - the arrival of a ball at its wall, or that part of its Hertz time if it arrives sooner;
 //! - a period of the ringing of a ball on its wall ([`RINGING`]), as longer steps alternate instead of following it;
+//! - that part of the time in which the film of a joint would be squeezed out ([`SQUEEZED`]);
 //! - the step at which forces other than contact forces move the mechanism by [`SMOOTH`] of its scales more or less than the
 //!   midpoint rule says, from their change since the step before;
 //! - [`LONGEST`].
@@ -38,6 +39,8 @@ const SLOW_STEPS: u32 = 3;
 const FEW_STEPS: f64 = 8.0;
 /// Half periods of ringing in a step.
 const RINGING: f64 = 2.0;
+/// Part of a film that a step squeezes out.
+const SQUEEZED: f64 = 0.5;
 /// Error of a step due to forces other than contact forces, relative to the scales of the positions.
 const SMOOTH: f64 = 3e-8;
 /// Scales of the velocities are those of the positions in this time, s.
@@ -47,6 +50,11 @@ impl DiscreteControl {
     /// At the start.
     pub(super) fn new(mechanism: &Mechanism) -> Self {
         Self { h: 0.0, acceleration: vec![0.0; mechanism.velocities()], smooth: LONGEST }
+    }
+
+    /// Lets the next step be the first.
+    pub(super) fn start_anew(&mut self) {
+        self.h = 0.0;
     }
 
     /// Records the step just accepted, of size `h`, that ends at `now`; with `finer` times the steps of the coarse ones.
@@ -94,7 +102,9 @@ fn set_rebounds(state: &State, mechanism: &Mechanism, h: f64, rebounds: &mut [Op
         let rises = gap.penetration > 0.0 && state.contacts[c].phase == ContactPhase::Restitution;
         let law = mechanism.contacts.coefficients(c);
         let speeds = state.record.impacts.speeds_under_way(c, law.speed_floor);
-        let Some([approach, separation]) = speeds.filter(|_| rises) else {
+        // A film takes up energy that the rebound by energy would give back.
+        let is_dry = !mechanism.has_film(mechanism.contacts.joint_of(c));
+        let Some([approach, separation]) = speeds.filter(|_| rises && is_dry) else {
             *rebound = None;
             continue;
         };
@@ -135,6 +145,18 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
                 h = h.min(arrival.max(step_in_impact(state, mechanism, c, gap.rate)));
             }
         }
+    }
+    for film in mechanism.films() {
+        for c in mechanism.contacts.of_play(film.joint, 0) {
+            let gap = state.now.gaps[c];
+            if gap.rate > 0.0 {
+                h = h.min(SQUEEZED / finer(state) * (film.thickness - gap.penetration.min(0.0)) / gap.rate);
+            }
+        }
+    }
+    // A film quickly takes up a start that does not fit it.
+    if control.h == 0.0 && !mechanism.films().is_empty() {
+        return SHORTEST;
     }
     h.min(GROWTH * state.control.h_next).max(SHORTEST)
 }
