@@ -288,6 +288,9 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
         .iter()
         .zip(&frame.joints)
         .map(|(joint, report)| match report.state {
+            ContactMode::Free if report.film_force.norm() > 0.0 => {
+                format!("{}  film {}", joint.name, newtons(&report.film_force))
+            }
             ContactMode::Free => format!("{}  free", joint.name),
             ContactMode::Ideal => {
                 format!("{}  reaction {}", joint.name, newtons(&report.normal_force))
@@ -357,6 +360,7 @@ fn legend(painter: &Painter, place: Rect, scale: f32, legend: &Legend, is_new: b
     }
     let hues = [
         ("normal", legend.normal, false),
+        ("film", legend.film, false),
         ("last peak", legend.normal.filter(|_| legend.peaks), true),
         ("friction", legend.friction, false),
     ];
@@ -581,6 +585,7 @@ mod tests {
             normal: Some(ink),
             peaks: true,
             friction: Some(ink),
+            film: Some(ink),
         }
     }
 

@@ -8,6 +8,7 @@ use super::theme::Material;
 use super::{
     Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot, Tick, to_f32,
 };
+use crate::machine::ElementKind;
 use crate::units::format_quantity_digits;
 
 /// Reference length of arrows, as a fraction of the picture height.
@@ -168,6 +169,11 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
                 }
             }
         });
+        let film = to_f32(&report.film_force);
+        let from = joint.ball_centre - film.normalize_or_zero() * joint.ball_radius;
+        if let Some(arrow) = options.normal.then(|| arrow(film, from)).flatten() {
+            arrow.push(&mut out.arrows, palette.film);
+        }
     }
     for report in external {
         let point = to_f32(&report.points[1]);
@@ -216,6 +222,7 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         force: mark * reference,
         fraction: arrow_length(mark * reference, reference, options.scaling).0,
     };
+    let has_films = shot.scene.machine.elements.iter().any(|element| matches!(element.kind, ElementKind::Film(_)));
     let are_balls = joints.iter().all(DrawnJoint::is_ball);
     out.legend = Some(Legend {
         on: if are_balls { "ball" } else { "carried part" },
@@ -227,6 +234,7 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         normal: options.normal.then_some(palette.normal),
         peaks: draws_peaks,
         friction: options.friction.then_some(palette.friction),
+        film: (options.normal && has_films).then_some(palette.film),
     });
 }
 

@@ -256,6 +256,8 @@ pub struct Legend {
     pub peaks: bool,
     /// Colour of friction; `None` if it is not drawn.
     pub friction: Option<Colour>,
+    /// Colour of the forces of lubricants; `None` if there are none.
+    pub film: Option<Colour>,
 }
 
 /// The colour legend of a wear map.

@@ -196,6 +196,57 @@ fn arrows_start_at_the_contact_and_have_the_legends_length() {
 }
 
 #[test]
+fn the_force_of_a_film_is_an_arrow_from_the_side_that_it_pushes() {
+    let dry = r#"
+        [contact]
+        clearance = "0.1 mm"
+        [[body]]
+        name = "ball"
+        mass = "1 kg"
+        inertia = "4e-5 4e-5 4e-5 kg m^2"
+        [[joint]]
+        name = "ball"
+        kind = "free"
+        child = "ball"
+        start = { position = "10 0 -50 um", velocity = "2 0 -5 mm/s" }
+        [[ball_joint]]
+        name = "S"
+        socket = { body = "world" }
+        ball = { body = "ball" }
+        "#;
+    let film = "[[film]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"50 mPa s\"\n";
+    let mut options = ViewOptions { triad: false, ..Default::default() };
+    options.arrows.reference = Some(100.0);
+    let (scene, frame) = started(&format!("{dry}{film}"), &[]);
+    let drawn = list(&scene, &frame, &options);
+    let force = to_f32(&frame.elements[0].force);
+    assert_eq!(to_f32(&frame.joints[0].film_force), force);
+    assert!((40.0..100.0).contains(&force.length()), "{force}");
+    let [shaft, head] = [Mesh::Cylinder, Mesh::Cone].map(|mesh| drawn.arrows.by_mesh[mesh.index()][0]);
+    assert_eq!(drawn.arrows.by_mesh[Mesh::Cone.index()].len(), 1);
+    let along = |i: &Instance| Vec3::new(i.world_from_mesh[0][2], i.world_from_mesh[1][2], i.world_from_mesh[2][2]);
+    let arrow = place(&head) + along(&head) - place(&shaft);
+    assert!(arrow.normalize().dot(force.normalize()) > 0.9999);
+    // As long as that of a contact force of its size.
+    let legend = drawn.legend.as_ref().expect("a legend");
+    let pixel = |point: Vec3| drawn.eye.project(point, SIZE).expect("before the eye");
+    let seen = pixel(place(&shaft)).distance(pixel(place(&shaft) + arrow)) / legend.pixels / (force.length() / 100.0);
+    assert!((0.7..=1.0).contains(&seen), "{seen}");
+    let from = place(ball(&drawn, 0.010)) - force.normalize() * 0.010;
+    assert!(place(&shaft).distance(from) < 1e-6, "{} {from}", place(&shaft));
+    assert!(legend.film.is_some());
+    options.arrows.normal = false;
+    options.arrows.friction = true;
+    let hidden = list(&scene, &frame, &options);
+    assert!(hidden.arrows.by_mesh[Mesh::Cone.index()].is_empty());
+    assert_eq!(hidden.legend.expect("a legend").film, None);
+    // Without a film, nothing of it.
+    options.arrows.normal = true;
+    let (scene, frame) = started(dry, &[]);
+    assert_eq!(list(&scene, &frame, &options).legend.expect("a legend").film, None);
+}
+
+#[test]
 fn a_logarithmic_scale_shortens_three_decades_to_one_length() {
     let (scene, frame) = fixture::pendulum();
     let mut options = ViewOptions::default();

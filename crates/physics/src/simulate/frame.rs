@@ -161,6 +161,8 @@ pub struct JointReport {
     pub normal_force: Vec3,
     /// Friction force on the ball, N.
     pub friction_force: Vec3,
+    /// Force of the lubricant in it on the ball, N.
+    pub film_force: Vec3,
     /// Where the forces act on the ball, Z_j + r n, m.
     pub contact_point: Vec3,
     /// Sliding speed used by the friction law, m/s.

@@ -44,6 +44,9 @@ pub(super) fn fill(
     out.elastic = mechanism.elastic_energy(time) + mechanism.bristle_energy(y);
     out.elements.clear();
     out.elements.extend(mechanism.element_reports(time));
+    for film in mechanism.films() {
+        out.joints[film.joint].film_force += out.elements[film.element].force;
+    }
     let (kinetic, gravitational) = mechanism.energies();
     out.kinetic = kinetic;
     out.potential = gravitational + out.elastic;

@@ -335,7 +335,7 @@ pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn Force
 #[derive(Clone, Copy, Debug)]
 pub struct FilmPlace {
     /// Index of the element.
-    pub(super) element: usize,
+    pub(crate) element: usize,
     /// Index of the loose joint.
     pub joint: usize,
     /// Least thickness, m.
