@@ -1,4 +1,4 @@
-"""Motors, loads and springs of a running simulation, and its motion linearised."""
+"""Motors, loads, springs and films of a running simulation, and its motion linearised."""
 
 from __future__ import annotations
 
@@ -100,6 +100,14 @@ class Spring(Element):
     preload: float = Element._number("preload", "Tension at `length`, or force to lower coordinates at `position`, N or N m.")
     length: float = Element._number("length", "Distance of the points without stretch, m; of a spring between two points.")
     position: float = Element._number("position", "Coordinate without stretch, m or rad; of a spring on a joint.")
+
+
+class Film(Element):
+    """A lubricant in a joint with play."""
+
+    __slots__ = ()
+
+    viscosity: float = Element._number("viscosity", "Dynamic viscosity, Pa s.")
 
 
 class Load(Element):

@@ -32,7 +32,7 @@ embedded! {
     BENCHMARKS in "benchmarks":
         "simple-pendulum", "n-four-bar", "squeezer", "bricard", "governor", "flores", "flip", "cardan", "backlash", "ball",
         "scott-russell", "trammel", "level-pin", "thrown-pin", "free-housing", "crank-pin", "driven-slide", "released-slide", "belt",
-        "worn-pin";
+        "worn-pin", "oiled";
 }
 
 /// The scene opened if none is named.

@@ -11,7 +11,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipj, ellipk
 
@@ -365,6 +365,38 @@ def groove():
     return {"worn": mean, "off": reach + (5.0 / 0.5e10) ** (2.0 / 3.0)}
 
 
+def oiled():
+    """Films from the pressure itself, in units of mu r^2 / c^3. A journal whose gap opens and closes as it turns: h^3 p' = -12 u (cos(theta) +
+    constant) over the half that closes, with p = 0 at both ends, u = e omega / 2, and theta from the thinnest place. Where its force carries
+    the weight, it rests, and then lies at the angle at which that force is upright. A ball that sinks: p = 3 (1 / h^2 - 1) u / eps over the
+    half below, and its equation of motion from a fifth of the play on."""
+    clearance, radius, length, omega = 1e-4, 1e-2, 24e-3, 100.0
+
+    def journal(ratio):
+        h = lambda theta: 1.0 - ratio * np.cos(theta)
+        # The part moves across, towards theta = 90 degrees: the film lies from 0 to 180.
+        sine = lambda theta: np.sin(theta - np.pi / 2)
+        constant = -quad(lambda t: sine(t) / h(t) ** 3, 0, np.pi)[0] / quad(lambda t: h(t) ** -3, 0, np.pi)[0]
+        slope = lambda theta: -12.0 * (sine(theta) + constant) / h(theta) ** 3
+        options = {"epsabs": 1e-13, "epsrel": 1e-13, "limit": 200}
+        along = quad(lambda t: slope(t) * np.sin(t), 0, np.pi, **options)[0]
+        across = -quad(lambda t: slope(t) * np.cos(t), 0, np.pi, **options)[0]
+        return 5e-3 * length * radius**3 / clearance**3 * 0.5 * omega * ratio * clearance * np.array([along, across])
+
+    ratio = brentq(lambda ratio: np.hypot(*journal(ratio)) - 10.0, 0.05, 0.95, xtol=1e-14)
+    along, across = journal(ratio)
+    attitude = np.arctan2(abs(across), abs(along))
+
+    def sinks(_, y):
+        x = y[0] / clearance
+        force = quad(lambda u: u * (1.0 / (1.0 - x * u) ** 2 - 1.0) / x, 0, 1, epsabs=1e-12, epsrel=1e-12)[0]
+        return [y[1], 10.0 - 6.0 * np.pi * 0.05 * radius**4 / clearance**3 * force * y[1] / 0.1]
+
+    solution = solve_ivp(sinks, (0.0, 1.0), [0.2 * clearance, 0.0], method="Radau", rtol=1e-11, atol=1e-16)
+    y, z = ratio * clearance * np.sin(attitude), -ratio * clearance * np.cos(attitude)
+    return {"y": y, "z": z, "depth": solution.y[0, -1]}
+
+
 JOINTS = Path(__file__).parents[2] / "physics" / "joints"
 
 
@@ -394,6 +426,7 @@ CASES = {
     "level_pin": level_pin,
     "belt": belt,
     "groove": groove,
+    "oiled": oiled,
     **{name: lambda name=name: contacts(name.removeprefix("joint_")) for name in (
         "joint_a", "joint_a_shaft", "joint_b", "joint_h", "joint_c", "joint_c_nofric", "joint_d1", "joint_d2"
     )},

@@ -1,0 +1,57 @@
+"""Lubricants: a film whose viscosity changes while it carries a turning journal."""
+
+import numpy as np
+import pytest
+
+import jointplay as jp
+
+JOURNAL = """
+name = "journal"
+gravity = { x = 0, y = 0, z = "-10 m/s^2" }
+[[body]]
+name = "pin"
+mass = "1 kg"
+inertia = "10 10 10 kg m^2"
+[[joint]]
+name = "J"
+kind = "revolute"
+child = "pin"
+axis = [1, 0, 0]
+play = { radial = "0.1 mm", length = "24 mm", radius = "10 mm" }
+start = { velocity = "100 rad/s" }
+[[film]]
+name = "oil"
+joint = "J"
+viscosity = "20 mPa s"
+"""
+
+
+def test_a_thinner_oil_carries_a_journal_farther_out():
+    simulation = jp.Simulation(jp.Scene.from_toml(JOURNAL))
+    film = simulation.films["oil"]
+    ratios = []
+    for viscosity in (0.02, 0.01, 0.005):
+        film.viscosity = viscosity
+        assert film.viscosity == viscosity
+        simulation.step_until(simulation.time + 0.6)
+        frame = simulation.frame()
+        # It carries the whole weight, without contact.
+        assert np.allclose(frame.film_forces[0], [0.0, 0.0, 10.0], atol=1e-2), frame.film_forces
+        assert not frame.normal_forces.any()
+        assert np.isclose(np.linalg.norm(frame.film_forces[0]), np.linalg.norm([simulation[f"oil.force.{axis}"] for axis in "xyz"]))
+        ratios.append(np.linalg.norm(frame.eccentricities[0]) / 1e-4)
+        # Sommerfeld, film of half a turn: the attitude angle falls with the eccentricity.
+        _, y, z = frame.eccentricities[0]
+        attitude = np.arctan2(np.pi * np.sqrt(1.0 - ratios[-1] ** 2), 2.0 * ratios[-1])
+        assert np.arctan2(abs(y), -z) == pytest.approx(attitude, abs=2e-3)
+    assert ratios[0] < ratios[1] < ratios[2] < 1.0
+
+
+def test_what_a_film_cannot_be_is_refused():
+    simulation = jp.Simulation(jp.Scene.from_toml(JOURNAL))
+    with pytest.raises(jp.OptionError, match="viscosity of oil = -1; allowed 0"):
+        simulation.films["oil"].viscosity = -1.0
+    with pytest.raises(jp.OptionError, match="no film is called"):
+        simulation.films["water"]
+    assert simulation.set("film.oil.viscosity", "30 mPa s") == "now"
+    assert simulation.films["oil"].viscosity == 0.03
