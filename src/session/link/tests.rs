@@ -74,7 +74,7 @@ impl Random {
             magnification: self.optional(|c| 1.0 + 99.0 * c.unit() as f32),
             follow: self.optional(|c| format!("joint.x{}x", c.text(6)).replace('\n', " ")),
             plots: self.optional(|c| {
-                let one = Quantity::ALL[c.below(16) as usize];
+                let one = Quantity::ALL[c.below(Quantity::ALL.len() as u64) as usize];
                 let others = Quantity::ALL.into_iter().filter(|q| *q != one);
                 let mut all: Vec<Quantity> = others.filter(|_| c.below(3) == 0).collect();
                 if c.below(2) == 0 {

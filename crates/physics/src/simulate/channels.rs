@@ -171,7 +171,8 @@ fn lay_out(
     place: impl Fn(&Signal) -> Option<u8>,
     mut add: impl FnMut(SignalValue<'_>),
 ) {
-    let mut signals: Vec<&Signal> = TABLE.iter().filter(|s| place(s).is_some()).collect();
+    let has = |signal: &&Signal| place(signal).is_some() && signal.of.is_in(machine);
+    let mut signals: Vec<&Signal> = TABLE.iter().filter(has).collect();
     signals.sort_by_key(|signal| place(signal));
     let key = |signal: &Signal| (place(signal), signal.source.repetition());
     for group in signals.chunk_by(|a, b| key(a) == key(b)) {
@@ -246,9 +247,7 @@ fn has_signal(
         SignalSource::FirstTurn(_) => freedom == Some(Freedom::FirstTurn),
         SignalSource::SecondTurn(_) => freedom == Some(Freedom::SecondTurn),
         SignalSource::OtherAxes(_) | SignalSource::OtherAngles(_) => part != machine.output.body,
-        SignalSource::Supplied(..) | SignalSource::Consumed(..) => {
-            known(machine.solver.energy_ledger) && (!signal.of_elements || !machine.elements.is_empty())
-        }
+        SignalSource::Supplied(..) | SignalSource::Consumed(..) => known(machine.solver.energy_ledger),
         SignalSource::ProbeError | SignalSource::ProbeDistance => known(machine.output.probe.is_some()),
         SignalSource::Displacement(_) => machine.loose_joints[part].kind != LooseKind::Ball,
         SignalSource::Element(_) => known(true),

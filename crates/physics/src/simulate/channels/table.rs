@@ -8,7 +8,7 @@ use SignalSource::{
     Site, SiteAxes, Slide, SlideCoordinate, Supplied, Turn, TurnRate,
 };
 
-use crate::machine::Vec3;
+use crate::machine::{ElementKind, Machine, Vec3};
 use crate::simulate::angles::pose_of;
 use crate::simulate::{BodyMotion, ContactMode, ElementReport, Frame, JointReport, Ledger, Pose, SiteReport};
 use crate::words::words;
@@ -19,6 +19,7 @@ use crate::words::words;
 pub enum Quantity {
     NormalForce,
     FrictionForce,
+    FilmForce,
     Eccentricity,
     Penetration,
     Position,
@@ -38,6 +39,7 @@ pub enum Quantity {
 words!(Quantity {
     NormalForce => "normal-force",
     FrictionForce => "friction-force",
+    FilmForce => "film-force",
     Eccentricity => "eccentricity",
     Penetration => "penetration",
     Position => "position",
@@ -215,6 +217,25 @@ impl SignalSource {
     }
 }
 
+/// What of a machine a signal needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Needed {
+    Nothing,
+    Elements,
+    Films,
+}
+
+impl Needed {
+    /// Whether `machine` has it.
+    pub fn is_in(self, machine: &Machine) -> bool {
+        match self {
+            Self::Nothing => true,
+            Self::Elements => !machine.elements.is_empty(),
+            Self::Films => machine.elements.iter().any(|element| matches!(element.kind, ElementKind::Film(_))),
+        }
+    }
+}
+
 /// One recorded quantity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Signal {
@@ -233,13 +254,13 @@ pub(super) struct Signal {
     pub run: Option<u8>,
     /// How it is read.
     pub source: SignalSource,
-    /// Whether it is absent in a scene without force elements.
-    pub of_elements: bool,
+    /// What a scene without this does not have.
+    pub of: Needed,
 }
 
 /// A signal in no plot, written by `run` only on request.
 const fn on_request(name: &'static str, column: &'static str, source: SignalSource, help: &'static str) -> Signal {
-    Signal { name, column, help, plot: None, run: None, source, of_elements: false }
+    Signal { name, column, help, plot: None, run: None, source, of: Needed::Nothing }
 }
 
 /// The same signal, shown in a plot.
@@ -256,8 +277,8 @@ const fn in_plot_and_run(plot: Quantity, place: u8, signal: Signal) -> Signal {
     in_plot(plot, in_run(place, signal))
 }
 
-const fn of_elements(signal: Signal) -> Signal {
-    Signal { of_elements: true, ..signal }
+const fn of(of: Needed, signal: Signal) -> Signal {
+    Signal { of, ..signal }
 }
 
 /// Every signal, in the order of saved records and of the members of a plot.
@@ -265,6 +286,7 @@ const fn of_elements(signal: Signal) -> Signal {
 pub(super) const TABLE: &[Signal] = &[
     in_plot_and_run(Q::NormalForce, 2, on_request("@.normal", "@_normal_N", Joint(|joint| joint.normal_force.norm()), "size of the normal force on the carried part; of an ideal joint, of its reaction")),
     in_plot(Q::FrictionForce, on_request("@.friction.size", "@_friction_N", Joint(|joint| joint.friction_force.norm()), "size of the friction force on the carried part")),
+    of(Needed::Films, in_plot(Q::FilmForce, on_request("@.film", "@_film_N", Joint(|joint| joint.film_force.norm()), "size of the force of the lubricant on the carried part"))),
     in_plot_and_run(Q::Eccentricity, 1, on_request("@.eccentricity.size", "@_eccentricity_m", Joint(|joint| joint.eccentricity.norm()), "distance of the ball's centre from the socket's; of a pin or a block, across its axis")),
     in_run(5, on_request("@.eccentricity.#", "@_e#_m", JointAxes(|joint| joint.eccentricity), "ball's centre from the socket's; of a pin or a block, across its axis")),
     in_plot_and_run(Q::Penetration, 5, on_request("@.penetration", "@_penetration_m", Joint(|joint| joint.penetration), "depth in the wall; negative where there is a gap")),
@@ -296,10 +318,10 @@ pub(super) const TABLE: &[Signal] = &[
     in_plot(Q::EnergyBalance, on_request("energy.change_work", "change_work_J", Supplied("changes", |ledger| ledger.change_work), "supplied by changed parameters since the start")),
     // Any scene can be pulled by hand.
     in_plot(Q::EnergyBalance, on_request("energy.external_work", "external_work_J", Supplied("external", |ledger| ledger.external_work), "supplied by external loads since the start")),
-    of_elements(in_run(14, on_request("energy.external_work", "external_work_J", Supplied("external", |ledger| ledger.external_work), "supplied by external loads since the start"))),
+    of(Needed::Elements, in_run(14, on_request("energy.external_work", "external_work_J", Supplied("external", |ledger| ledger.external_work), "supplied by external loads since the start"))),
     in_plot_and_run(Q::EnergyBalance, 10, on_request("energy.restitution_loss", "restitution_loss_J", Consumed("restitution", |ledger| ledger.restitution_loss), "lost to restitution since the start")),
     in_plot_and_run(Q::EnergyBalance, 10, on_request("energy.friction_loss", "friction_loss_J", Consumed("friction", |ledger| ledger.friction_loss), "lost to friction since the start")),
-    of_elements(in_plot_and_run(Q::EnergyBalance, 13, on_request("energy.damping_loss", "damping_loss_J", Consumed("damping", |ledger| ledger.damping_loss), "lost to dampers since the start"))),
+    of(Needed::Elements, in_plot_and_run(Q::EnergyBalance, 13, on_request("energy.damping_loss", "damping_loss_J", Consumed("damping", |ledger| ledger.damping_loss), "lost to dampers since the start"))),
     in_plot(Q::EnergyBalance, on_request("energy.kinetic_change", "kinetic_change_J", Consumed("kinetic", |ledger| ledger.kinetic_change), "change of the kinetic energy since the start")),
     in_plot(Q::EnergyBalance, on_request("energy.elastic_change", "elastic_change_J", Consumed("elastic", |ledger| ledger.elastic_change), "change of the elastic energy since the start")),
     in_plot_and_run(Q::EnergyBalance, 11, on_request("energy.residual", "energy_residual_J", Supplied("residual", Ledger::residual), "error of the integration: energy that came from nowhere since the start")),
