@@ -655,8 +655,11 @@ fn read_film(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> 
     };
     let length = reader.section.get("length").map(|_| reader.number("length")).transpose()?;
     match joint.kind {
-        LooseKind::Pin(pin) if pin.length.or(length).is_none() => {
-            return reader.fault("length", "missing; a pin that stays in its plane has none of its own");
+        LooseKind::Pin(_) if joint.pin_length().or(length).is_none() => {
+            return reader.fault(
+                "length",
+                "missing; a pin that stays in its plane has a length only with elastic = \"line\" or stiffness_at",
+            );
         }
         LooseKind::Pin(_) => {}
         LooseKind::Ball | LooseKind::Slide(_) => {
@@ -665,7 +668,6 @@ fn read_film(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> 
     }
     Ok(ElementKind::Film(Film {
         joint: index,
-        between: [joint.carrier(), joint.carried()],
         viscosity: reader.number("viscosity")?,
         thickness: reader.number("thickness")?,
         length,

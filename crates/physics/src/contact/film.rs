@@ -259,6 +259,11 @@ impl Film {
         found
     }
 
+    /// Thickness of the thinnest place at this |e|, m.
+    pub fn thickness_at(&self, distance: f64) -> f64 {
+        self.gap(distance).clearance - distance
+    }
+
     /// The motion `u`, m/s, at the eccentricity `e`, m, along its normal and across, and what resists it.
     fn motion(&self, e: &Vec3, u: &Vec3) -> (Motion, Resistance) {
         let (distance, speed) = (e.norm(), u.norm());

@@ -191,8 +191,6 @@ pub struct Tyre {
 pub struct Film {
     /// Index of the joint among [`super::Machine::loose_joints`].
     pub joint: usize,
-    /// Points of that joint on its carrier and on the carried part.
-    pub between: [Attachment; 2],
     /// Dynamic viscosity, Pa s.
     pub viscosity: f64,
     /// Thickness that the film does not fall below, as the surfaces are rough, m.
@@ -278,14 +276,11 @@ impl Film {
         let positive = |value: f64| value > 0.0 && value.is_finite();
         let holds = |joint: &LooseJoint| match joint.kind {
             LooseKind::Ball => self.length.is_none(),
-            LooseKind::Pin(pin) => self.length.or(pin.length).is_some_and(positive),
+            LooseKind::Pin(_) => self.length.or(joint.pin_length()).is_some_and(positive),
             LooseKind::Slide(_) => false,
         };
         let joint = machine.loose_joints.get(self.joint);
-        joint.is_some_and(|joint| holds(joint) && self.between == [joint.carrier(), joint.carried()])
-            && self.viscosity >= 0.0
-            && self.viscosity.is_finite()
-            && positive(self.thickness)
+        joint.is_some_and(holds) && self.viscosity >= 0.0 && self.viscosity.is_finite() && positive(self.thickness)
     }
 }
 
@@ -298,6 +293,8 @@ pub enum Place {
     Between([Attachment; 2]),
     /// On a coordinate of a joint.
     Coordinate(JointCoordinate),
+    /// In a joint with play: its index among [`super::Machine::loose_joints`].
+    Loose(usize),
 }
 
 /// What an element says of itself, whatever its kind.
@@ -359,7 +356,7 @@ impl Element {
                 law: tyre.ground.as_ref().map(|ground| ("ground", ground)),
                 ..of("tyre", Place::Point(tyre.on))
             },
-            ElementKind::Film(film) => of("film", Place::Between(film.between)),
+            ElementKind::Film(film) => of("film", Place::Loose(film.joint)),
         }
     }
 
@@ -377,12 +374,15 @@ impl Element {
         }
     }
 
-    /// Points of application in `machine`: one, or two for an element between points; of one on a joint coordinate, the parent and
-    /// child points of that joint.
+    /// Points of application in `machine`: one, or two for an element between points; of one on a joint coordinate or in a joint, the
+    /// points of that joint.
     pub fn points(&self, machine: &Machine) -> Vec<Attachment> {
         match self.describe().place {
             Place::Point(point) => vec![point],
             Place::Between(points) => points.to_vec(),
+            Place::Loose(joint) => {
+                machine.loose_joints.get(joint).map_or_else(Vec::new, |joint| vec![joint.carrier(), joint.carried()])
+            }
             Place::Coordinate(on) => {
                 let joint = machine.kinematic_joints().nth(on.joint);
                 joint.map_or_else(Vec::new, |joint| joint.points().to_vec())
@@ -394,7 +394,7 @@ impl Element {
     pub fn coordinate(&self) -> Option<JointCoordinate> {
         match self.describe().place {
             Place::Coordinate(on) => Some(on),
-            Place::Point(_) | Place::Between(_) => None,
+            Place::Point(_) | Place::Between(_) | Place::Loose(_) => None,
         }
     }
 

@@ -20,11 +20,7 @@ impl LooseKind {
         match (*self, play) {
             (Self::Ball, _) => Some(4.0 * PI * radius * radius),
             (Self::Pin(pin), 0) => {
-                // A pin that stays in its plane has a length only where its elastic law needs one.
-                let length = pin.length.or(match contact.elasticity {
-                    Elasticity::Line { length } | Elasticity::StiffnessAt { length, .. } => Some(length),
-                    Elasticity::Sphere | Elasticity::Stiffness(_) => None,
-                });
+                let length = pin.length_by(contact);
                 length.map(|length| 2.0 * PI * radius * length)
             }
             (Self::Pin(pin), _) => {
@@ -52,7 +48,25 @@ impl LooseKind {
     }
 }
 
+impl Pin {
+    /// Length L, m, of a pin with these contact parameters, if it has one: one that stays in its plane only where its elastic law needs it.
+    fn length_by(&self, contact: &Parameters) -> Option<f64> {
+        self.length.or(match contact.elasticity {
+            Elasticity::Line { length } | Elasticity::StiffnessAt { length, .. } => Some(length),
+            Elasticity::Sphere | Elasticity::Stiffness(_) => None,
+        })
+    }
+}
+
 impl LooseJoint {
+    /// Length of its pin, m, if it tells one.
+    pub fn pin_length(&self) -> Option<f64> {
+        match self.kind {
+            LooseKind::Pin(pin) => pin.length_by(&self.contact),
+            LooseKind::Ball | LooseKind::Slide(_) => None,
+        }
+    }
+
     /// Whether it has walls that wear by direction: the profiles of these are part of the state.
     pub fn wears_by_direction(&self) -> bool {
         self.contact.has_profile() && !matches!(self.kind, LooseKind::Slide(_))

@@ -416,7 +416,7 @@ impl Contacts {
         if self.bristles > 0 {
             self.straighten_bristles();
         }
-        if self.contacts.is_empty() || matches!(at.active_set, ActiveSet::Nothing) {
+        if self.contacts.is_empty() || matches!(at.active_set, ActiveSet::Nothing | ActiveSet::Solved) {
             return;
         }
         self.move_clearances(at.t);

@@ -6,6 +6,10 @@
 //! ([`Coefficients::step_force`]), so that Newton's method needs three rows per contact in place of one per coordinate: F = f(u +
 //! h/2 W M^-1 sum S^T F, s + h/2 S M^-1 sum S^T F).
 //!
+//! The film of a joint is solved for like a contact, by rows of its own. Its force is that at the part theta of the step, from 1/2 where the
+//! film is soft to 1 where it is stiff: theta = 1 / (1 - exp(-z)) - 1 / z, with which a velocity that falls as exp(-z t / h) is exact (Liniger &
+//! Willoughby 1970, SIAM J. Numer. Anal. 7, 47). At the middle a stiff film would turn a velocity that does not fit it into an oscillation.
+//!
 //! No event is located. The eccentricity at the end is that of the guessed motion, plus h W times the change of V.
 
 use super::band::Band;
@@ -13,14 +17,14 @@ use super::bounds;
 use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
 use super::coupled::{CoupledRows, add_impulse, apply_inverse_mass, mobility_between};
-use super::elements::{ActiveSet, At, Counts, ForceElement, Powers};
+use super::elements::{ActiveSet, At, Counts, Film as ElementFilm, ForceElement, Powers};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
 use super::loose::Wall;
 use super::model::{Anchor, ContactId, Model, Site};
 use super::systems::Evaluator;
 use super::{Latest, Mechanism, MechanismError, elements};
-use crate::contact::{Coefficients, ContactState, ContactStep, StepForce};
+use crate::contact::{Coefficients, ContactState, ContactStep, Film, StepForce};
 use crate::integrate::System as _;
 use crate::machine::{Mat3, Vec3};
 
@@ -31,10 +35,14 @@ const CUTS: u32 = 4;
 const CUT: f64 = 0.4;
 /// Change of a velocity at which the iteration ends, unless friction requires a smaller one, m/s or rad/s.
 const VELOCITY_TOLERANCE: f64 = 1e-4;
+/// The same at a film, which is stiffer, m/s.
+const FILM_TOLERANCE: f64 = 1e-6;
 /// An element is stepped implicitly if its force changes its own relative motion by at least this fraction over half a step.
 const MIN_RELATIVE_CHANGE: f64 = 0.05;
 /// Distance of the end from the guessed one, over the scales, beyond which the step is repeated from there.
 const GUESS_TOLERANCE: f64 = 1e-5;
+/// Eccentricity over the clearance at which a guess has left a film.
+const FAR_BEYOND: f64 = 1.5;
 /// Speed at which other contacts may push a ball towards its wall within a step, m/s.
 const SPEED_MARGIN: f64 = 0.05;
 
@@ -44,12 +52,57 @@ enum Law {
     Contact(Coefficients),
     /// Change of a force element's force, or torque, with its mean relative velocity, N s/m or N m s/rad.
     Element(Mat3),
+    /// A station of a film.
+    Film(FilmStep),
+}
+
+/// A station of a film over a step.
+struct FilmStep {
+    law: Film,
+    h: f64,
+    /// Velocity at the start, m/s, the eccentricity there, m, and its change over the guessed motion.
+    velocity: Vec3,
+    start: Vec3,
+    change: Vec3,
+    /// Onto the directions that the wall confines.
+    confined: Mat3,
+    /// theta.
+    part: f64,
+    /// Where it acts: on the part, and on that with the wall.
+    points: [Anchor; 2],
+}
+
+impl FilmStep {
+    /// Eccentricity and velocity at its part of the step for the mean velocity `u`, m/s, where the guessed motion has `guessed`.
+    fn at_part(&self, u: &Vec3, guessed: &Vec3) -> [Vec3; 2] {
+        let e = self.start + (self.change + (u - guessed) * self.h) * self.part;
+        [e, u + (u - self.velocity) * (2.0 * self.part - 1.0)]
+    }
+
+    /// Sets the part of the step for the guessed velocity, m/s, and the `mobility` of its row, 1/kg.
+    fn fit(&mut self, guessed: &Vec3, mobility: &Mat3) {
+        let [_, by_velocity] = self.law.derivatives(&(self.start + self.change), guessed, &self.confined);
+        let rates = mobility * by_velocity * self.h;
+        let decay = guessed.try_normalize(0.0).map_or(rates.norm(), |along| (rates * along).norm());
+        self.part = if decay < 1e-3 { 0.5 + decay / 12.0 } else { 1.0 / (1.0 - libm::exp(-decay)) - 1.0 / decay };
+    }
+
+    /// Force and derivatives.
+    fn force(&self, u: &Vec3, guessed: &Vec3) -> StepForce {
+        let [e, v] = self.at_part(u, guessed);
+        let [by_e, by_v] = self.law.derivatives(&e, &v, &self.confined);
+        StepForce {
+            force: self.law.force(&e, &v),
+            by_velocity: by_e * (self.part * self.h) + by_v * (2.0 * self.part),
+            ..StepForce::default()
+        }
+    }
 }
 
 /// A row that is solved for: a contact that touches or may within the step, or an element that is stepped
 /// implicitly.
 struct SolvedRow {
-    /// Contacts by index, then two rows per element, for its force and its torque.
+    /// Contacts by index, then two rows per element, for its force and its torque, and one for each station of a film.
     index: usize,
     law: Law,
     step: ContactStep,
@@ -105,7 +158,7 @@ impl SolvedRow {
     fn contact(&self) -> Option<(usize, &Coefficients)> {
         match &self.law {
             Law::Contact(law) => Some((self.index, law)),
-            Law::Element(_) => None,
+            Law::Element(_) | Law::Film(_) => None,
         }
     }
 
@@ -127,7 +180,11 @@ impl SolvedRow {
 
 /// Workspace, allocated once.
 pub struct DiscreteGradient {
-    contacts: usize,
+    /// First row of each element, and first of all stations of films among them.
+    first_row: Vec<usize>,
+    first_station: Vec<usize>,
+    /// Velocity and eccentricity at the start, and eccentricity at the guessed end, of each station of a film, m/s and m.
+    stations: Vec<[Vec3; 3]>,
     /// Upper bounds on the effect of a force and a torque of each element on its relative motion, 1/kg and 1/(kg m^2).
     max_mobility: Vec<[f64; 2]>,
     coupled: CoupledRows,
@@ -191,7 +248,7 @@ pub struct StepStart<'a> {
 }
 
 impl DiscreteGradient {
-    /// For a state of `dimension` components, of which `n` are velocities, and elements between these bodies; `within` if
+    /// For a state of `dimension` components, of which `n` are velocities, and elements between these bodies, with so many stations of films; `within` if
     /// a force accelerates only the trees it acts on.
     ///
     /// # Errors
@@ -201,16 +258,32 @@ impl DiscreteGradient {
         dimension: usize,
         n: usize,
         within: bool,
-        elements: &[[Anchor; 2]],
+        elements: &[([Anchor; 2], usize)],
     ) -> Result<Self, MechanismError> {
         let contacts = model.sites.len();
         let of_contacts = model.sites.iter().map(|site| [site.carried.body, site.carrier.body]);
-        let of_elements = elements.iter().flat_map(|ends| [ends.map(|end| end.body); 2]);
+        let rows_of = |(_, stations): &([Anchor; 2], usize)| 2 + stations;
+        let of_elements = elements.iter().flat_map(|element| {
+            let bodies = element.0.map(|end| end.body);
+            std::iter::repeat_n(bodies, rows_of(element))
+        });
+        let before = |all: &[([Anchor; 2], usize)], count: &dyn Fn(&([Anchor; 2], usize)) -> usize, from: usize| {
+            let mut next = from;
+            all.iter()
+                .map(|element| {
+                    let first = next;
+                    next += count(element);
+                    first
+                })
+                .collect::<Vec<usize>>()
+        };
         let coupled = CoupledRows::new(model, n, within, of_contacts.chain(of_elements))?;
         let (rows, bandwidth) = (coupled.spans.len(), coupled.bandwidth);
         Ok(Self {
-            contacts,
-            max_mobility: elements.iter().map(|ends| max_mobility(model, ends)).collect(),
+            first_row: before(elements, &rows_of, contacts),
+            first_station: before(elements, &|(_, stations)| *stations, 0),
+            stations: vec![[Vec3::zeros(); 3]; elements.iter().map(|(_, stations)| stations).sum()],
+            max_mobility: elements.iter().map(|(ends, _)| max_mobility(model, ends)).collect(),
             band: Band::with_capacity(rows, bandwidth),
             rows: Vec::with_capacity(rows),
             arranged: Vec::with_capacity(rows),
@@ -284,6 +357,9 @@ impl DiscreteGradient {
         h: f64,
     ) {
         for (i, element) in elements.iter().enumerate() {
+            if let Some(film) = element.film() {
+                self.gather_stations(model, film, equations, i, h);
+            }
             let Some(coupling) = element.coupling(at) else {
                 continue;
             };
@@ -296,7 +372,7 @@ impl DiscreteGradient {
             if 0.5 * h * change < MIN_RELATIVE_CHANGE {
                 continue;
             }
-            let row = self.contacts + 2 * i;
+            let row = self.first_row[i];
             let columns = &mut self.columns[row];
             match torque_gain {
                 Some(gain) => {
@@ -314,6 +390,60 @@ impl DiscreteGradient {
             self.rows.push(SolvedRow::new(row, Law::Element(gain)));
         }
         self.rows.sort_unstable_by_key(|row| row.index);
+    }
+
+    /// Records all stations of films at the start, or their eccentricities at the guessed end, from the motion just measured.
+    fn record_stations(&mut self, elements: &[Box<dyn ForceElement>], motion: &[Kinematics], at_end: bool) {
+        let films = elements.iter().enumerate().filter_map(|(i, element)| Some((i, element.film()?)));
+        for (i, film) in films {
+            for (own, station) in self.stations[self.first_station[i]..].iter_mut().zip(film.stations(motion)) {
+                match at_end {
+                    true => own[2] = station.eccentricity,
+                    false => [own[0], own[1]] = [station.velocity, station.eccentricity],
+                }
+            }
+        }
+    }
+
+    /// Whether the guessed motion leads a part far beyond the wall of its film.
+    fn leaves_a_film(&self, elements: &[Box<dyn ForceElement>]) -> bool {
+        elements.iter().zip(&self.first_station).any(|(element, first)| {
+            element.film().is_some_and(|film| {
+                let ends = self.stations[*first..].iter().take(film.len());
+                ends.into_iter().any(|[.., end]| end.norm() > FAR_BEYOND * film.law.clearance)
+            })
+        })
+    }
+
+    /// Adds the stations of `film`, element `i`, from the motion at the middle.
+    fn gather_stations(&mut self, model: &Model, film: &ElementFilm, equations: &dyn Equations, i: usize, h: f64) {
+        let motion = equations.motion();
+        for (k, station) in film.stations(motion).enumerate() {
+            let row = self.first_row[i] + 2 + k;
+            let [velocity, start, end] = self.stations[self.first_station[i] + k];
+            let points = film.points(&station, motion);
+            let columns = &mut self.columns[row];
+            collect_columns(columns, model, equations, &points.map(|point| (point, 0.0)), &Vec3::zeros());
+            for column in columns {
+                column.centre = station.confined * column.centre;
+                column.surface = column.centre;
+            }
+            let (law, confined) = (film.law, station.confined);
+            let step = FilmStep { law, h, velocity, start, change: end - start, confined, part: 1.0, points };
+            self.rows.push(SolvedRow { guessed: [station.velocity; 3], ..SolvedRow::new(row, Law::Film(step)) });
+        }
+    }
+
+    /// Largest error of the place of a part over the thickness of its film, as of a velocity that falls exponentially over the step just
+    /// solved: h |u1 - u0| (theta - 1/2).
+    fn largest_misplacement(&self) -> f64 {
+        let misplacement = |row: &SolvedRow| {
+            let Law::Film(step) = &row.law else { return 0.0 };
+            let u = row.free[0] + row.added[0];
+            let [e, _] = step.at_part(&u, &row.guessed[0]);
+            2.0 * (u - step.velocity).norm() * step.h * (step.part - 0.5) / step.law.thickness_at(e.norm())
+        };
+        self.rows.iter().map(misplacement).fold(0.0, f64::max)
     }
 
     /// Jacobian columns of the contacts, and the mean velocities, from the motion at the middle with the guessed velocities.
@@ -371,7 +501,11 @@ impl DiscreteGradient {
             }
         }
         for (i, row) in rows.iter_mut().enumerate() {
-            row.mobility = row.normal.dot(&(mobility[band.diagonal(i)] * row.normal));
+            let own = &mobility[band.diagonal(i)];
+            row.mobility = row.normal.dot(&(own * row.normal));
+            if let Law::Film(step) = &mut row.law {
+                step.fit(&row.guessed[0], own);
+            }
         }
     }
 
@@ -399,6 +533,7 @@ impl DiscreteGradient {
                         counts.friction += u64::from(step_force.force != Vec3::zeros() && law.has_friction());
                         step_force
                     }
+                    Law::Film(step) => step.force(&u, &row.guessed[0]),
                     Law::Element(gain) => {
                         StepForce { force: gain * (u - row.guessed[0]), by_velocity: *gain, ..StepForce::default() }
                     }
@@ -481,7 +616,8 @@ impl DiscreteGradient {
         for row in rows {
             row.added = row.of_motion(moved_by(&columns[row.index], |i| scratch[i]));
             row.full = row.added;
-            change = change.max((row.added[0] - row.before[0]).norm());
+            let finer = if matches!(row.law, Law::Film(_)) { VELOCITY_TOLERANCE / FILM_TOLERANCE } else { 1.0 };
+            change = change.max((row.added[0] - row.before[0]).norm() * finer);
             change = change.max((row.added[1] - row.before[1]).norm());
         }
         change
@@ -571,7 +707,9 @@ impl Mechanism {
             let world = self.model.bodies.len();
             let fixed = Anchor { body: world, offset: Vec3::zeros() };
             let ends = |element: &dyn ForceElement| element.ends(motion).unwrap_or([fixed; 2]);
-            let elements: Vec<[Anchor; 2]> = self.elements.iter().map(|element| ends(&**element)).collect();
+            let stations = |element: &dyn ForceElement| element.film().map_or(0, ElementFilm::len);
+            let elements = self.elements.iter().map(|element| (ends(&**element), stations(&**element)));
+            let elements: Vec<([Anchor; 2], usize)> = elements.collect();
             let discrete = DiscreteGradient::new(&self.model, dimension, velocities, within, &elements)?;
             self.discrete = Some(Box::new(discrete));
         }
@@ -597,6 +735,11 @@ impl Mechanism {
         let rows = &self.discrete.as_ref()?.rows;
         let row = rows.binary_search_by_key(&c, |row| row.index).ok()?;
         Some(rows[row].mobility)
+    }
+
+    /// Largest error of the place of a part over the thickness of its film in the latest such step, as estimated.
+    pub(crate) fn largest_misplacement(&self) -> f64 {
+        self.discrete.as_ref().map_or(0.0, |discrete| discrete.largest_misplacement())
     }
 
     /// Derivative of the velocities without contact forces at the middle of the latest such step.
@@ -640,6 +783,20 @@ impl Evaluator<'_> {
         converged
     }
 
+    /// Middle and end of the step with the guessed mean velocity, and the measurement of the end.
+    fn follow_guess(&mut self, discrete: &mut DiscreteGradient, from: &StepStart<'_>) {
+        for (part, at) in [(1.0, &mut discrete.end), (0.5, &mut discrete.middle)] {
+            at.copy_from_slice(from.y);
+            at[self.mechanism.velocity_range()].copy_from_slice(&discrete.guess);
+            for (step, guess) in discrete.displacement.iter_mut().zip(&discrete.guess) {
+                *step = part * from.h * guess;
+            }
+            self.mechanism.equations.displace(&self.mechanism.model, at, &discrete.displacement);
+        }
+        self.mechanism.measure(from.t + from.h, &discrete.end);
+        discrete.record_stations(&self.mechanism.elements, self.mechanism.motion(), true);
+    }
+
     fn discrete_step_in(
         &mut self,
         discrete: &mut DiscreteGradient,
@@ -654,6 +811,7 @@ impl Evaluator<'_> {
             self.mechanism.measure(t, y);
         }
         discrete.record_start(&self.mechanism.contacts, self.mechanism.motion());
+        discrete.record_stations(&self.mechanism.elements, self.mechanism.motion(), false);
         for (i, guess) in discrete.guess.iter_mut().enumerate() {
             *guess = y[positions + i] + 0.5 * h * k[positions + i];
         }
@@ -667,21 +825,18 @@ impl Evaluator<'_> {
                 }
                 discrete.guess.copy_from_slice(&discrete.mean);
             }
-            for (part, at) in [(1.0, &mut discrete.end), (0.5, &mut discrete.middle)] {
-                at.copy_from_slice(y);
-                at[self.mechanism.velocity_range()].copy_from_slice(&discrete.guess);
-                for (step, guess) in discrete.displacement.iter_mut().zip(&discrete.guess) {
-                    *step = part * h * guess;
-                }
-                self.mechanism.equations.displace(&self.mechanism.model, at, &discrete.displacement);
+            self.follow_guess(discrete, from);
+            if pass == 0 && discrete.leaves_a_film(&self.mechanism.elements) {
+                // The rates of a film that the motion did not fit lead far away.
+                discrete.guess.copy_from_slice(&y[self.mechanism.velocity_range()]);
+                self.follow_guess(discrete, from);
             }
-            self.mechanism.measure(t + h, &discrete.end);
             discrete.rows.clear();
             if !matches!(self.active_set, ActiveSet::Nothing) {
                 discrete.gather(&self.mechanism.contacts, from, all);
             }
             // All forces except those of contacts, at the middle.
-            let active_set = std::mem::replace(&mut self.active_set, ActiveSet::Nothing);
+            let active_set = std::mem::replace(&mut self.active_set, ActiveSet::Solved);
             self.derivative(t + 0.5 * h, &discrete.middle, &mut discrete.rate);
             self.active_set = active_set;
             for (i, mean) in discrete.mean.iter_mut().enumerate() {
@@ -689,7 +844,7 @@ impl Evaluator<'_> {
             }
             let Mechanism { model, equations, elements, contacts, .. } = &mut *self.mechanism;
             let bristles = &y[y.len() - contacts.bristles()..];
-            let at = At { t: t + 0.5 * h, motion: equations.motion(), active_set: ActiveSet::Nothing, bristles };
+            let at = At { t: t + 0.5 * h, motion: equations.motion(), active_set: ActiveSet::Solved, bristles };
             discrete.gather_elements(model, elements, &**equations, &at, h);
             if !discrete.rows.is_empty() {
                 discrete.linearise_rows(model, &**equations, (contacts, bristles));
@@ -742,6 +897,10 @@ impl Evaluator<'_> {
         let mut powers = Powers::default();
         for row in &mut discrete.rows {
             let Some((contact, _)) = row.contact() else {
+                if matches!(row.law, Law::Film(_)) {
+                    let [change, _] = moved_by(&discrete.columns[row.index], |i| discrete.mean[i] - discrete.guess[i]);
+                    powers.damping -= row.force.dot(&(row.guessed[0] + change));
+                }
                 continue;
             };
             let [centres, surfaces] = moved_by(&discrete.columns[row.index], |i| discrete.mean[i] - discrete.guess[i]);
@@ -766,11 +925,21 @@ impl Evaluator<'_> {
             return;
         }
         for element in elements.iter() {
-            element.add_powers(t, equations.motion(), &mut powers);
+            match element.film() {
+                Some(film) => powers.damping += film.drag_power(equations.motion()),
+                None => element.add_powers(t, equations.motion(), &mut powers),
+            }
         }
         if !model.drives.is_empty() {
             let (motion, wrench) = equations.loads();
             for row in &discrete.rows {
+                if let Law::Film(step) = &row.law {
+                    for (point, force) in step.points.iter().zip([row.force, -row.force]) {
+                        let own = &mut wrench[point.body];
+                        own.force += force;
+                        own.torque += (motion[point.body].rotation * point.offset).cross(&force);
+                    }
+                }
                 let Some((contact, law)) = row.contact() else {
                     continue;
                 };

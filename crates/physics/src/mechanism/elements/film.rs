@@ -2,7 +2,7 @@
 //! their centres: what the pressure turns them by is then part of it, and momentum, angular momentum and the balance of energy are exact.
 //! A pin that tilts has two stations with half of the film each, at the nodes of Gauss's rule over its length.
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, TorqueDerivatives, push};
+use super::{ActiveSet, At, Coupling, ElementReport, ForceElement, Loads, TorqueDerivatives, push};
 use crate::contact::{Film as Law, FilmShape};
 use crate::machine::{self, LooseKind, Machine, Mat3, Vec3};
 use crate::mechanism::Powers;
@@ -10,8 +10,9 @@ use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::loose::Wall;
 use crate::mechanism::model::{Anchor, Model};
 
-pub(super) struct Film {
-    law: Law,
+pub struct Film {
+    /// The law of each station.
+    pub law: Law,
     /// Centres on the body with the wall and on the other; none in a joint without play.
     stations: Vec<[Anchor; 2]>,
     /// Axis of the wall, in the axes of its body, unless it is a sphere.
@@ -20,15 +21,15 @@ pub(super) struct Film {
     is_reversed: bool,
 }
 
-/// A station at one instant, world axes.
-struct State {
+/// A station at one instant, world axes; of the body with the wall, then of the other.
+pub struct Station {
     /// Where the force acts, from the centroids of both bodies and in the world, m.
     arms: [Vec3; 2],
     point: Vec3,
-    /// e, m, and the velocity there, m/s, in the confined directions.
-    eccentricity: Vec3,
-    velocity: Vec3,
-    confined: Mat3,
+    /// e, m, and the velocity there, m/s, in the confined directions, onto which `confined` projects.
+    pub eccentricity: Vec3,
+    pub velocity: Vec3,
+    pub confined: Mat3,
 }
 
 impl Film {
@@ -36,7 +37,7 @@ impl Film {
         let joint = &machine.loose_joints[film.joint];
         let radius = joint.contact.ball_radius;
         let length = match joint.kind {
-            LooseKind::Pin(pin) => Some(film.length.unwrap_or_else(|| pin.seat_length(radius))),
+            LooseKind::Pin(_) => film.length.or(joint.pin_length()),
             LooseKind::Ball | LooseKind::Slide(_) => None,
         };
         let mut sites = model.sites.iter().filter(|site| site.joint == film.joint && site.play == 0);
@@ -69,7 +70,7 @@ impl Film {
         }
     }
 
-    fn state(&self, [wall, edge]: &[Anchor; 2], motion: &[Kinematics]) -> State {
+    fn state(&self, [wall, edge]: &[Anchor; 2], motion: &[Kinematics]) -> Station {
         let bodies = [&motion[wall.body], &motion[edge.body]];
         let confined = self.axis.map_or_else(Mat3::identity, |axis| {
             let axis = bodies[0].rotation * axis;
@@ -80,7 +81,7 @@ impl Film {
         let eccentricity = confined * apart;
         let arm = offsets[1] - eccentricity * 0.5;
         let arms = [(bodies[1].position - bodies[0].position) + arm, arm];
-        State {
+        Station {
             point: bodies[1].position + arm,
             velocity: confined * (bodies[1].point_velocity(&arms[1]) - bodies[0].point_velocity(&arms[0])),
             arms,
@@ -89,12 +90,36 @@ impl Film {
         }
     }
 
-    fn force(&self, s: &State) -> Vec3 {
+    /// Number of its stations; 0 in a joint without play.
+    pub fn len(&self) -> usize {
+        self.stations.len()
+    }
+
+    /// Its stations at `motion`.
+    pub fn stations(&self, motion: &[Kinematics]) -> impl Iterator<Item = Station> {
+        self.stations.iter().map(|ends| self.state(ends, motion))
+    }
+
+    /// The points of both bodies at which the force of `station` acts, first that of the part on which it acts.
+    pub fn points(&self, station: &Station, motion: &[Kinematics]) -> [Anchor; 2] {
+        [1, 0].map(|side| {
+            let body = self.stations[0][side].body;
+            Anchor { body, offset: motion[body].rotation.tr_mul(&station.arms[side]) }
+        })
+    }
+
+    /// Power that the drag dissipates, W.
+    pub fn drag_power(&self, motion: &[Kinematics]) -> f64 {
+        let spin = self.spin(motion);
+        self.stations(motion).map(|s| spin.dot(&(self.drag(&s, motion) * spin))).sum()
+    }
+
+    fn force(&self, s: &Station) -> Vec3 {
         self.law.force(&s.eccentricity, &s.velocity)
     }
 
     /// Drag of a station, N m s/rad: the torque is minus that times the angular velocity of the part against the wall.
-    fn drag(&self, s: &State, motion: &[Kinematics]) -> Mat3 {
+    fn drag(&self, s: &Station, motion: &[Kinematics]) -> Mat3 {
         let distance = s.eccentricity.norm();
         let [about, across] = self.law.drag(distance);
         let axis = match self.axis {
@@ -121,7 +146,7 @@ impl Film {
 
     /// Mean point of the stations, m.
     fn middle(&self, motion: &[Kinematics]) -> Vec3 {
-        let points = self.stations.iter().map(|ends| self.state(ends, motion).point);
+        let points = self.stations(motion).map(|s| s.point);
         points.sum::<Vec3>() / self.stations.len().max(1) as f64
     }
 }
@@ -131,7 +156,8 @@ impl ForceElement for Film {
         let spin = self.spin(at.motion);
         for ends in &self.stations {
             let s = self.state(ends, at.motion);
-            let force = self.force(&s);
+            let is_solved = matches!(at.active_set, ActiveSet::Solved);
+            let force = if is_solved { Vec3::zeros() } else { self.force(&s) };
             let torque = self.drag(&s, at.motion) * -spin;
             for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
                 let wrench = &mut loads.wrench[ends[side].body];
@@ -141,16 +167,17 @@ impl ForceElement for Film {
         }
     }
 
+    fn film(&self) -> Option<&Film> {
+        Some(self)
+    }
+
     fn set_clearance(&mut self, clearance: f64) {
         self.law.clearance = clearance;
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let spin = self.spin(motion);
-        for ends in &self.stations {
-            let s = self.state(ends, motion);
-            powers.damping += spin.dot(&(self.drag(&s, motion) * spin)) - self.force(&s).dot(&s.velocity);
-        }
+        let pressure = self.stations(motion).map(|s| -self.force(&s).dot(&s.velocity));
+        powers.damping += self.drag_power(motion) + pressure.sum::<f64>();
     }
 
     fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
@@ -168,12 +195,16 @@ impl ForceElement for Film {
         let (mut along, mut torque) = ([Mat3::zeros(); 2], TorqueDerivatives::default());
         for station in &self.stations {
             let s = self.state(station, at.motion);
+            torque.by_angular_velocity -= self.drag(&s, at.motion);
+            if matches!(at.active_set, ActiveSet::Solved) {
+                continue;
+            }
             let [by_displacement, by_velocity] = self.law.derivatives(&s.eccentricity, &s.velocity, &s.confined);
             let arm = (s.point - middle).cross_matrix();
             along[0] += by_displacement;
             along[1] += by_velocity;
             torque.by_rotation -= arm * by_displacement * arm;
-            torque.by_angular_velocity -= arm * by_velocity * arm + self.drag(&s, at.motion);
+            torque.by_angular_velocity -= arm * by_velocity * arm;
         }
         Some(Coupling::at_one_point(ends, along, torque))
     }

@@ -28,7 +28,7 @@ use crate::machine::{self, Attachment, Element, ElementKind, JointCoordinate, Lo
 use bushing::Bushing;
 pub(super) use coordinate::AngleReference;
 use coordinate::{Coordinate, OnCoordinate};
-use film::Film;
+pub(super) use film::Film;
 use joint_spring::JointSpring;
 use load::Load;
 use motor::Motor;
@@ -46,6 +46,8 @@ pub enum ActiveSet<'a> {
     Immediate(&'a [ContactState]),
     /// No contact carries a force.
     Nothing,
+    /// No contact carries a force, nor does the pressure of a film: they are solved for.
+    Solved,
 }
 
 impl<'a> ActiveSet<'a> {
@@ -60,7 +62,7 @@ impl<'a> ActiveSet<'a> {
         match self {
             Self::Located(all) => Some(&all[j]).filter(|state| state.active),
             Self::Immediate(all) => Some(&all[j]),
-            Self::Nothing => None,
+            Self::Nothing | Self::Solved => None,
         }
     }
 }
@@ -316,6 +318,11 @@ pub(super) trait ForceElement: Send + Sync {
     /// Sets the reference that determines the turns of the angle on which it acts, if any. The element reads its joint's
     /// coordinate, which counts turns, although it measures poses.
     fn set_angle_reference(&mut self, _reference: AngleReference) {}
+
+    /// The film, if it is one.
+    fn film(&self) -> Option<&Film> {
+        None
+    }
 
     /// Sets the clearance of the joint in which it is, m, if it is in one.
     fn set_clearance(&mut self, _clearance: f64) {}

@@ -10,7 +10,7 @@
 //!   midpoint rule says, from their change since the step before;
 //! - [`LONGEST`].
 //!
-//! Beyond [`COARSE`] steps per impact the last three shrink, too, so that the motion converges.
+//! Beyond [`COARSE`] steps per impact the last four shrink, too, so that the motion converges.
 
 use super::{ContactMemory, DiscreteControl, NEARLY, State, StepEnd, Stepping, store_gaps};
 use crate::contact::{ContactPhase, ElasticLaw};
@@ -39,6 +39,8 @@ const SLOW_STEPS: u32 = 3;
 const FEW_STEPS: f64 = 8.0;
 /// Half periods of ringing in a step.
 const RINGING: f64 = 2.0;
+/// Largest error of the place of a part in a step, over the thickness of its film.
+const MISPLACED: f64 = 0.01;
 /// Part of a film that a step squeezes out.
 const SQUEEZED: f64 = 0.5;
 /// Error of a step due to forces other than contact forces, relative to the scales of the positions.
@@ -50,11 +52,6 @@ impl DiscreteControl {
     /// At the start.
     pub(super) fn new(mechanism: &Mechanism) -> Self {
         Self { h: 0.0, acceleration: vec![0.0; mechanism.velocities()], smooth: LONGEST }
-    }
-
-    /// Lets the next step be the first.
-    pub(super) fn start_anew(&mut self) {
-        self.h = 0.0;
     }
 
     /// Records the step just accepted, of size `h`, that ends at `now`; with `finer` times the steps of the coarse ones.
@@ -154,10 +151,6 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
             }
         }
     }
-    // A film quickly takes up a start that does not fit it.
-    if control.h == 0.0 && !mechanism.films().is_empty() {
-        return SHORTEST;
-    }
     h.min(GROWTH * state.control.h_next).max(SHORTEST)
 }
 
@@ -231,6 +224,10 @@ impl Stepping<'_> {
                     part = part.min((theta * h).max(longest) / h);
                 }
             }
+        }
+        let misplacement = mechanism.largest_misplacement() * finer(state);
+        if misplacement > MISPLACED {
+            part = part.min(MISPLACED / misplacement);
         }
         (part < 1.0).then(|| part.max(LEAST_PART))
     }

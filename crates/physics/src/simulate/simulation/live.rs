@@ -175,10 +175,6 @@ impl Stepping<'_> {
 
     fn sync_parameters(&mut self) {
         sync_parameters(self.mechanism, self.model, self.state);
-        if !self.mechanism.films().is_empty() {
-            // They take up quickly what the change does not fit.
-            self.state.control.discrete.start_anew();
-        }
     }
 
     /// Rewinds to `time` within the latest step, on its interpolant; only for a simulation without contacts.
