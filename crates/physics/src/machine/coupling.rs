@@ -31,12 +31,12 @@ impl Machine {
                 linked[a.max(b)] = a.min(b);
             }
         }
-        // Of each joint, and of each element twice, for its force and its torque, and of a film for its stations: the trees it acts on.
+        // Of each joint, and of each element twice, for its force and its torque, or of a film for its drag and its stations: the trees it acts on.
         let of_joints = self.loose_joints.iter().map(|joint| [joint.carrier().body, joint.carried().body]);
         let points = self.elements.iter().map(|element| element.points(self));
         let of_elements = points.zip(&self.elements).flat_map(|(points, element)| {
             let bodies = [0, 1].map(|n| points.get(n).and_then(|point| point.body));
-            std::iter::repeat_n(bodies, if matches!(element.kind, ElementKind::Film(_)) { 4 } else { 2 })
+            std::iter::repeat_n(bodies, if matches!(element.kind, ElementKind::Film(_)) { 3 } else { 2 })
         });
         let rows = of_joints.chain(of_elements).map(|bodies| bodies.map(|body| body.and_then(|body| tree_of[body])));
         let rows: Vec<[Option<usize>; 2]> = rows.collect();

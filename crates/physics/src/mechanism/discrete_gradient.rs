@@ -52,23 +52,29 @@ enum Law {
     Contact(Coefficients),
     /// Change of a force element's force, or torque, with its mean relative velocity, N s/m or N m s/rad.
     Element(Mat3),
-    /// A station of a film.
+    /// A station of a film, or its drag.
     Film(FilmStep),
 }
 
-/// A station of a film over a step.
+/// What of a film resists.
+enum Resistance {
+    /// Pressure at a station, in the directions onto which the matrix projects.
+    Pressure(Film, Mat3),
+    /// Drag, N m s/rad.
+    Drag(Mat3),
+}
+
+/// A station of a film, or its drag, over a step.
 struct FilmStep {
-    law: Film,
+    resistance: Resistance,
     h: f64,
-    /// Velocity at the start, m/s, the eccentricity there, m, and its change over the guessed motion.
+    /// Velocity at the start, m/s or rad/s; the eccentricity there, m, and its change over the guessed motion.
     velocity: Vec3,
     start: Vec3,
     change: Vec3,
-    /// Onto the directions that the wall confines.
-    confined: Mat3,
     /// theta.
     part: f64,
-    /// Where it acts: on the part, and on that with the wall.
+    /// On the part, and on that with the wall.
     points: [Anchor; 2],
 }
 
@@ -81,7 +87,10 @@ impl FilmStep {
 
     /// Sets the part of the step for the guessed velocity, m/s, and the `mobility` of its row, 1/kg.
     fn fit(&mut self, guessed: &Vec3, mobility: &Mat3) {
-        let [_, by_velocity] = self.law.derivatives(&(self.start + self.change), guessed, &self.confined);
+        let by_velocity = match &self.resistance {
+            Resistance::Pressure(law, confined) => law.derivatives(&(self.start + self.change), guessed, confined)[1],
+            Resistance::Drag(drag) => -drag,
+        };
         let rates = mobility * by_velocity * self.h;
         let decay = guessed.try_normalize(0.0).map_or(rates.norm(), |along| (rates * along).norm());
         self.part = if decay < 1e-3 { 0.5 + decay / 12.0 } else { 1.0 / (1.0 - libm::exp(-decay)) - 1.0 / decay };
@@ -90,19 +99,19 @@ impl FilmStep {
     /// Force and derivatives.
     fn force(&self, u: &Vec3, guessed: &Vec3) -> StepForce {
         let [e, v] = self.at_part(u, guessed);
-        let [by_e, by_v] = self.law.derivatives(&e, &v, &self.confined);
-        StepForce {
-            force: self.law.force(&e, &v),
-            by_velocity: by_e * (self.part * self.h) + by_v * (2.0 * self.part),
-            ..StepForce::default()
-        }
+        let (force, [by_e, by_v]) = match &self.resistance {
+            Resistance::Pressure(law, confined) => (law.force(&e, &v), law.derivatives(&e, &v, confined)),
+            Resistance::Drag(drag) => (drag * -v, [Mat3::zeros(), -drag]),
+        };
+        let by_velocity = by_e * (self.part * self.h) + by_v * (2.0 * self.part);
+        StepForce { force, by_velocity, ..StepForce::default() }
     }
 }
 
 /// A row that is solved for: a contact that touches or may within the step, or an element that is stepped
 /// implicitly.
 struct SolvedRow {
-    /// Contacts by index, then two rows per element, for its force and its torque, and one for each station of a film.
+    /// Contacts by index, then two rows per element, for its force and its torque, or of a film one for its drag and one for each station.
     index: usize,
     law: Law,
     step: ContactStep,
@@ -180,10 +189,10 @@ impl SolvedRow {
 
 /// Workspace, allocated once.
 pub struct DiscreteGradient {
-    /// First row of each element, and first of all stations of films among them.
+    /// First row of each element, and place of its first among all rows of films.
     first_row: Vec<usize>,
     first_station: Vec<usize>,
-    /// Velocity and eccentricity at the start, and eccentricity at the guessed end, of each station of a film, m/s and m.
+    /// Velocity and eccentricity at the start, and eccentricity at the guessed end, of each row of a film, m/s and m.
     stations: Vec<[Vec3; 3]>,
     /// Upper bounds on the effect of a force and a torque of each element on its relative motion, 1/kg and 1/(kg m^2).
     max_mobility: Vec<[f64; 2]>,
@@ -248,7 +257,7 @@ pub struct StepStart<'a> {
 }
 
 impl DiscreteGradient {
-    /// For a state of `dimension` components, of which `n` are velocities, and elements between these bodies, with so many stations of films; `within` if
+    /// For a state of `dimension` components, of which `n` are velocities, and elements between these bodies, with so many rows of a film; `within` if
     /// a force accelerates only the trees it acts on.
     ///
     /// # Errors
@@ -262,7 +271,7 @@ impl DiscreteGradient {
     ) -> Result<Self, MechanismError> {
         let contacts = model.sites.len();
         let of_contacts = model.sites.iter().map(|site| [site.carried.body, site.carrier.body]);
-        let rows_of = |(_, stations): &([Anchor; 2], usize)| 2 + stations;
+        let rows_of = |(_, stations): &([Anchor; 2], usize)| (*stations).max(2);
         let of_elements = elements.iter().flat_map(|element| {
             let bodies = element.0.map(|end| end.body);
             std::iter::repeat_n(bodies, rows_of(element))
@@ -358,7 +367,8 @@ impl DiscreteGradient {
     ) {
         for (i, element) in elements.iter().enumerate() {
             if let Some(film) = element.film() {
-                self.gather_stations(model, film, equations, i, h);
+                self.gather_film(model, film, equations, i, h);
+                continue;
             }
             let Some(coupling) = element.coupling(at) else {
                 continue;
@@ -396,7 +406,9 @@ impl DiscreteGradient {
     fn record_stations(&mut self, elements: &[Box<dyn ForceElement>], motion: &[Kinematics], at_end: bool) {
         let films = elements.iter().enumerate().filter_map(|(i, element)| Some((i, element.film()?)));
         for (i, film) in films {
-            for (own, station) in self.stations[self.first_station[i]..].iter_mut().zip(film.stations(motion)) {
+            let (drag, stations) = self.stations[self.first_station[i]..].split_first_mut().expect("a row of drag");
+            drag[0] = film.spin(motion);
+            for (own, station) in stations.iter_mut().zip(film.stations(motion)) {
                 match at_end {
                     true => own[2] = station.eccentricity,
                     false => [own[0], own[1]] = [station.velocity, station.eccentricity],
@@ -409,18 +421,18 @@ impl DiscreteGradient {
     fn leaves_a_film(&self, elements: &[Box<dyn ForceElement>]) -> bool {
         elements.iter().zip(&self.first_station).any(|(element, first)| {
             element.film().is_some_and(|film| {
-                let ends = self.stations[*first..].iter().take(film.len());
+                let ends = self.stations[*first + 1..].iter().take(film.len());
                 ends.into_iter().any(|[.., end]| end.norm() > FAR_BEYOND * film.law.clearance)
             })
         })
     }
 
-    /// Adds the stations of `film`, element `i`, from the motion at the middle.
-    fn gather_stations(&mut self, model: &Model, film: &ElementFilm, equations: &dyn Equations, i: usize, h: f64) {
+    /// Adds the drag of `film`, element `i`, and its stations, from the motion at the middle.
+    fn gather_film(&mut self, model: &Model, film: &ElementFilm, equations: &dyn Equations, i: usize, h: f64) {
         let motion = equations.motion();
         for (k, station) in film.stations(motion).enumerate() {
-            let row = self.first_row[i] + 2 + k;
-            let [velocity, start, end] = self.stations[self.first_station[i] + k];
+            let row = self.first_row[i] + 1 + k;
+            let [velocity, start, end] = self.stations[self.first_station[i] + 1 + k];
             let points = film.points(&station, motion);
             let columns = &mut self.columns[row];
             collect_columns(columns, model, equations, &points.map(|point| (point, 0.0)), &Vec3::zeros());
@@ -428,8 +440,19 @@ impl DiscreteGradient {
                 column.centre = station.confined * column.centre;
                 column.surface = column.centre;
             }
-            let (law, confined) = (film.law, station.confined);
-            let step = FilmStep { law, h, velocity, start, change: end - start, confined, part: 1.0, points };
+            let resistance = Resistance::Pressure(film.law, station.confined);
+            if k == 0 {
+                let (row, velocity) = (self.first_row[i], self.stations[self.first_station[i]][0]);
+                let columns = &mut self.columns[row];
+                collect_relative_columns(columns, model, equations, &points.map(|point| (point, 1.0)));
+                columns.iter_mut().for_each(|column| (column.centre, column.surface) = (column.turn, column.turn));
+                let resistance = Resistance::Drag(film.whole_drag(motion));
+                let zero = Vec3::zeros();
+                let step = FilmStep { resistance, h, velocity, start: zero, change: zero, part: 1.0, points };
+                let guessed = [film.spin(motion); 3];
+                self.rows.push(SolvedRow { guessed, ..SolvedRow::new(row, Law::Film(step)) });
+            }
+            let step = FilmStep { resistance, h, velocity, start, change: end - start, part: 1.0, points };
             self.rows.push(SolvedRow { guessed: [station.velocity; 3], ..SolvedRow::new(row, Law::Film(step)) });
         }
     }
@@ -438,10 +461,12 @@ impl DiscreteGradient {
     /// solved: h |u1 - u0| (theta - 1/2).
     fn largest_misplacement(&self) -> f64 {
         let misplacement = |row: &SolvedRow| {
-            let Law::Film(step) = &row.law else { return 0.0 };
+            let Law::Film(step @ FilmStep { resistance: Resistance::Pressure(law, _), .. }) = &row.law else {
+                return 0.0;
+            };
             let u = row.free[0] + row.added[0];
             let [e, _] = step.at_part(&u, &row.guessed[0]);
-            2.0 * (u - step.velocity).norm() * step.h * (step.part - 0.5) / step.law.thickness_at(e.norm())
+            2.0 * (u - step.velocity).norm() * step.h * (step.part - 0.5) / law.thickness_at(e.norm())
         };
         self.rows.iter().map(misplacement).fold(0.0, f64::max)
     }
@@ -670,7 +695,7 @@ impl DiscreteGradient {
 
 /// Upper bounds on the effect of a force, 1/kg, and of a torque, 1/(kg m^2), between two points on their relative motion. They
 /// hold for free bodies; joints only reduce the effect.
-fn max_mobility(model: &Model, ends: &[Anchor; 2]) -> [f64; 2] {
+pub(super) fn max_mobility(model: &Model, ends: &[Anchor; 2]) -> [f64; 2] {
     let mut max_mobility = [0.0; 2];
     for end in ends {
         let Some(body) = model.bodies.get(end.body).filter(|body| !body.driven_only) else {
@@ -707,7 +732,7 @@ impl Mechanism {
             let world = self.model.bodies.len();
             let fixed = Anchor { body: world, offset: Vec3::zeros() };
             let ends = |element: &dyn ForceElement| element.ends(motion).unwrap_or([fixed; 2]);
-            let stations = |element: &dyn ForceElement| element.film().map_or(0, ElementFilm::len);
+            let stations = |element: &dyn ForceElement| element.film().map_or(0, |film| 1 + film.len());
             let elements = self.elements.iter().map(|element| (ends(&**element), stations(&**element)));
             let elements: Vec<([Anchor; 2], usize)> = elements.collect();
             let discrete = DiscreteGradient::new(&self.model, dimension, velocities, within, &elements)?;
@@ -925,9 +950,9 @@ impl Evaluator<'_> {
             return;
         }
         for element in elements.iter() {
-            match element.film() {
-                Some(film) => powers.damping += film.drag_power(equations.motion()),
-                None => element.add_powers(t, equations.motion(), &mut powers),
+            // Of films, the rows know more.
+            if element.film().is_none() {
+                element.add_powers(t, equations.motion(), &mut powers);
             }
         }
         if !model.drives.is_empty() {
@@ -936,8 +961,13 @@ impl Evaluator<'_> {
                 if let Law::Film(step) = &row.law {
                     for (point, force) in step.points.iter().zip([row.force, -row.force]) {
                         let own = &mut wrench[point.body];
-                        own.force += force;
-                        own.torque += (motion[point.body].rotation * point.offset).cross(&force);
+                        match step.resistance {
+                            Resistance::Drag(_) => own.torque += force,
+                            Resistance::Pressure(..) => {
+                                own.force += force;
+                                own.torque += (motion[point.body].rotation * point.offset).cross(&force);
+                            }
+                        }
                     }
                 }
                 let Some((contact, law)) = row.contact() else {

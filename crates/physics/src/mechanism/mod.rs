@@ -833,6 +833,20 @@ impl Mechanism {
         &self.films
     }
 
+    /// Bound of the rate at which films damp the motion last measured, 1/s; 0 without films.
+    pub(crate) fn fastest_film(&self) -> f64 {
+        let motion = self.motion();
+        let rate = |film: &FilmPlace| {
+            let film = self.elements[film.element].film()?;
+            let rates = film.stations(motion).map(|station| {
+                let points = film.points(&station, motion);
+                film.damping(&station).norm() * discrete_gradient::max_mobility(&self.model, &points)[0]
+            });
+            Some(rates.sum::<f64>())
+        };
+        self.films.iter().filter_map(rate).fold(0.0, f64::max)
+    }
+
     /// Whether a film is in loose joint `j`, which has play.
     pub(crate) fn has_film(&self, j: usize) -> bool {
         self.films.binary_search_by_key(&j, |film| film.joint).is_ok()

@@ -108,10 +108,14 @@ impl Film {
         })
     }
 
-    /// Power that the drag dissipates, W.
-    pub fn drag_power(&self, motion: &[Kinematics]) -> f64 {
-        let spin = self.spin(motion);
-        self.stations(motion).map(|s| spin.dot(&(self.drag(&s, motion) * spin))).sum()
+    /// Derivative of the force of a station with respect to its velocity, N s/m.
+    pub fn damping(&self, s: &Station) -> Mat3 {
+        self.law.derivatives(&s.eccentricity, &s.velocity, &s.confined)[1]
+    }
+
+    /// Drag of the whole film, as of a station.
+    pub fn whole_drag(&self, motion: &[Kinematics]) -> Mat3 {
+        self.stations(motion).map(|s| self.drag(&s, motion)).sum()
     }
 
     fn force(&self, s: &Station) -> Vec3 {
@@ -140,7 +144,7 @@ impl Film {
     }
 
     /// Angular velocity of the part against the wall, rad/s.
-    fn spin(&self, motion: &[Kinematics]) -> Vec3 {
+    pub fn spin(&self, motion: &[Kinematics]) -> Vec3 {
         self.bodies(motion).map_or_else(Vec3::zeros, |[wall, edge]| edge.angular_velocity - wall.angular_velocity)
     }
 
@@ -153,11 +157,13 @@ impl Film {
 
 impl ForceElement for Film {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        if matches!(at.active_set, ActiveSet::Solved) {
+            return;
+        }
         let spin = self.spin(at.motion);
         for ends in &self.stations {
             let s = self.state(ends, at.motion);
-            let is_solved = matches!(at.active_set, ActiveSet::Solved);
-            let force = if is_solved { Vec3::zeros() } else { self.force(&s) };
+            let force = self.force(&s);
             let torque = self.drag(&s, at.motion) * -spin;
             for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
                 let wrench = &mut loads.wrench[ends[side].body];
@@ -177,7 +183,8 @@ impl ForceElement for Film {
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let pressure = self.stations(motion).map(|s| -self.force(&s).dot(&s.velocity));
-        powers.damping += self.drag_power(motion) + pressure.sum::<f64>();
+        let spin = self.spin(motion);
+        powers.damping += spin.dot(&(self.whole_drag(motion) * spin)) + pressure.sum::<f64>();
     }
 
     fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
@@ -196,9 +203,6 @@ impl ForceElement for Film {
         for station in &self.stations {
             let s = self.state(station, at.motion);
             torque.by_angular_velocity -= self.drag(&s, at.motion);
-            if matches!(at.active_set, ActiveSet::Solved) {
-                continue;
-            }
             let [by_displacement, by_velocity] = self.law.derivatives(&s.eccentricity, &s.velocity, &s.confined);
             let arm = (s.point - middle).cross_matrix();
             along[0] += by_displacement;

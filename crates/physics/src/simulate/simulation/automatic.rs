@@ -91,16 +91,18 @@ impl SchemeSelector {
 
 impl Stepping<'_> {
     /// Starts with the implicit scheme if balls touch from the start and their laws have no damping: explicit steps would sustain
-    /// the ringing at a multiple of the tolerance, and implicit ones would then have to resolve it.
+    /// the ringing at a multiple of the tolerance, and implicit ones would then have to resolve it. Or if a film is too stiff for the first
+    /// explicit step.
     pub(super) fn choose_first_scheme(&mut self) {
         let Self { mechanism, state, .. } = self;
         let touching = || state.now.contact_states.iter().enumerate().filter(|(_, m)| m.active).map(|(c, _)| c);
         let undamped = |c| mechanism.contacts.coefficients(c).damping == 0.0;
         let velocities = mechanism.velocities();
+        let rings = touching().next().is_some() && touching().all(undamped);
+        let is_stiff = mechanism.fastest_film() * state.control.h_next > STABILITY_LIMIT;
         if state.conditions.solver.method == Method::Automatic
             && velocities <= mechanism.largest_implicit()
-            && touching().next().is_some()
-            && touching().all(undamped)
+            && (rings || is_stiff)
             && !mechanism.is_kinematic()
         {
             self.set_scheme(ActiveScheme::Implicit);
@@ -171,7 +173,8 @@ impl Stepping<'_> {
         }
         let touches = state.now.contact_states.iter().any(|m| m.active);
         let limited = selector.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
-        let settled = limited || (touches && selector.since_contact >= SETTLED_STEPS);
+        let is_damped = touches || !self.mechanism.films().is_empty();
+        let settled = limited || (is_damped && selector.since_contact >= SETTLED_STEPS);
         if settled && velocities <= self.mechanism.largest_implicit() {
             (selector.since_contact, selector.limited) = (0, 0);
             selector.h_explicit = h;
