@@ -11,7 +11,7 @@ use crate::analysis::ideal_fault::ideal_fault;
 use crate::analysis::initial_peaks::InitialPeaks;
 use crate::contact::FrictionLaw;
 use crate::integrate::{Method, StepControl};
-use crate::machine::{Body, Element, Joint, JointKind, LooseJoint, LooseKind, Pin, Slide};
+use crate::machine::{Body, Element, Joint, JointKind, LooseJoint, LooseKind, Machine, Pin, Place, Slide};
 use crate::mechanism::{ElementReport, Summary};
 use crate::scene::Scene;
 use crate::simulate::{ChannelInfo, Frame, Peak, channels_of};
@@ -110,7 +110,7 @@ fn report(
         line("Force elements", &format!("{}, with their forces at the start", scene.machine.elements.len()));
     }
     for (element, report) in scene.machine.elements.iter().zip(&start.elements) {
-        line(&format!("  {}", element.name), &force_element(element, report));
+        line(&format!("  {}", element.name), &force_element(&scene.machine, element, report));
     }
     start_report.lines.iter().for_each(|(label, value)| line(label, value));
     if let Some(beginning) = beginning {
@@ -263,8 +263,13 @@ fn dimensions(joint: &LooseJoint) -> String {
     parts.join(", ")
 }
 
-/// Kind of a force element, and its force and torque at the start.
-fn force_element(element: &Element, report: &ElementReport) -> String {
+/// Kind of a force element of `machine`, and its force and torque at the start.
+fn force_element(machine: &Machine, element: &Element, report: &ElementReport) -> String {
+    if let Place::Loose(joint) = element.describe().place
+        && machine.loose_joints[joint].contact.clearance == 0.0
+    {
+        return format!("{}: none, as {} has no play", element.describe().word, machine.loose_joints[joint].name);
+    }
     let force = report.own_force().map(|force| format!("{} N", significant(force.norm(), 6)));
     let torque = report.torque.map(|torque| format!("{} N m", significant(torque.norm(), 6)));
     let exerts: Vec<String> = force.into_iter().chain(torque).collect();

@@ -289,6 +289,62 @@ fn a_ball_thrown_at_its_wall_loses_speed_to_the_film_and_comes_to_rest_in_dry_co
 }
 
 #[test]
+fn a_machine_with_films_starts_settled_and_in_equilibrium() {
+    // A rod that hangs on a ball, which lies on the wall of its socket.
+    let text = jointplay_scene::built_in_text("pendulum").unwrap();
+    let name = Scene::parse(text, None, &[]).unwrap().machine.loose_joints[0].name.clone();
+    let film = format!("[[film]]\nname = \"oil\"\njoint = \"{name}\"\nviscosity = \"20 mPa s\"\n");
+    for start in ["settled", "equilibrium"] {
+        let starts = [text.to_owned(), format!("{text}\n{film}")].map(|text| {
+            let mut simulation = start_simulation(&text, &[("start", start)]);
+            frame_now(&mut simulation).joints[0].ball_centre
+        });
+        assert_eq!(starts[0], starts[1], "{start}");
+    }
+}
+
+#[test]
+fn a_stiff_film_slows_neither_implicit_nor_automatic_steps() {
+    // A ball of 2.4 g in a film of 10 um: explicit steps would be of some nanoseconds.
+    let text = free_ball(0.002, 1e-4, -10.0, "clearance = \"10 um\"")
+        + "[[film]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"4 mPa s\"\n";
+    let text = replaced(&text, "\"0.1 kg\"", "\"2.4 g\"");
+    for method in ["radau5", "automatic", "discrete-gradient"] {
+        let mut simulation = start_simulation(&text, &[("solver.method", method)]);
+        run_until(&mut simulation, 9e-3);
+        let statistics = simulation.statistics();
+        println!("{method}: {} steps", statistics.steps);
+        assert!(statistics.steps < 200, "{method}: {statistics:?}");
+    }
+}
+
+#[test]
+fn discrete_gradient_steps_account_for_the_energy_of_films_and_drives() {
+    // A crank at 3000 rpm that turns a rod on a film of 50 um, of which each step is a large part.
+    let text = "gravity = { x = 0, y = 0, z = 0 }\n\
+        [[body]]\nname = \"crank\"\nmass = \"0.3 kg\"\ninertia = \"1e-4 1e-4 1e-4 kg m^2\"\n\
+        [[joint]]\nname = \"main\"\nkind = \"revolute\"\nchild = \"crank\"\naxis = [0, 1, 0]\n\
+        drive = { law = \"constant\", velocity = \"3000 rpm\" }\n\
+        [[body]]\nname = \"rod\"\nmass = \"0.2 kg\"\ninertia = \"1e-5 3e-4 3e-4 kg m^2\"\ncentre = \"75 0 0 mm\"\n\
+        [[joint]]\nname = \"S\"\nkind = \"revolute\"\nparent = \"crank\"\nchild = \"rod\"\naxis = [0, 1, 0]\n\
+        parent_point = \"50 0 0 mm\"\nplay = { radial = \"50 um\", length = \"20 mm\", radius = \"10 mm\" }\n\
+        [[body]]\nname = \"slider\"\nmass = \"0.5 kg\"\ninertia = \"1e-4 1e-4 1e-4 kg m^2\"\n\
+        [[joint]]\nname = \"guide\"\nkind = \"prismatic\"\nchild = \"slider\"\naxis = [1, 0, 0]\nparent_point = \"200 0 0 mm\"\n\
+        [[joint]]\nname = \"pin\"\nkind = \"revolute\"\nparent = \"rod\"\nchild = \"slider\"\naxis = [0, 1, 0]\nparent_point = \"150 0 0 mm\"\n\
+        closes_loop = true\n\
+        [[film]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"50 mPa s\"\n";
+    let losses = ["radau5", "discrete-gradient"].map(|method| {
+        let mut simulation = start_simulation(text, &[("solver.method", method), ("start", "ideal")]);
+        run_until(&mut simulation, 0.1);
+        let ledger = simulation.ledger().unwrap();
+        println!("{method}: {ledger:?}, {:e}", ledger.share());
+        assert!(ledger.share() < 1e-4, "{method}: {ledger:?}");
+        ledger.damping_loss
+    });
+    assert!((losses[1] / losses[0] - 1.0).abs() < 0.03, "{losses:?}");
+}
+
+#[test]
 fn a_film_in_a_joint_without_play_changes_no_bit() {
     let joints = joints(0.0);
     for joint in [&joints[0], &replaced(&joints[1], "radial = \"0.1 mm\"", "radial = 0")] {
@@ -357,6 +413,16 @@ fn invalid_films_are_refused_with_their_position() {
         let (from, to) = change.split_once(" => ").expect(change);
         Scene::parse(&replaced(&sinking(), from, to), Some("mine.toml"), &[])
     });
+    let line = replaced(&journal(), "length = \"24 mm\"", "length = \"24 mm\", planar = true, elastic = \"line\"");
+    assert!(Scene::parse(&line, None, &[]).is_ok(), "the elastic law tells the length");
+    let thick = Scene::parse(&replaced(&journal(), "\"1 nm\"", "\"60 um\""), None, &[]).unwrap();
+    let doubts: Vec<String> = thick.machine.doubts().iter().map(ToString::to_string).collect();
+    assert!(
+        doubts
+            .iter()
+            .any(|doubt| doubt.contains("film oil: its thickness 60 um is above half of the play 100 um of joint S")),
+        "{doubts:?}"
+    );
     let planar = replaced(&journal(), ", length = \"24 mm\"", ", planar = true");
     let error = Scene::parse(&planar, Some("mine.toml"), &[]).unwrap_err().to_string();
     assert!(error.contains("film.oil.length: missing; a pin that stays in its plane has a length only"), "{error}");

@@ -10,7 +10,7 @@
 //! - Q = C g (1 + s D u_n / (D^2 u_n^2 + w^2 u_t^2)^1/2), where s = 1 - (1 - 0.4 eps) g(0) / g,
 //!
 //! which is exact for motion along n, where P = C f(eps) u_n closing and C f(-eps) u_n opening, and for motion across it, where P = C w |u_t|
-//! and Q = C g. Between both it interpolates, with s fitted: within 12 % of the film in that half, or of its force across. Coefficients:
+//! and Q = C g. Between both it interpolates, with s fitted: within 14 % of the film in that half, or of its force across. Coefficients:
 //!
 //! - A pin in a bearing long against its radius (Pinkus & Sternlicht, Theory of Hydrodynamic Lubrication, 1961): C = mu L r^3 / c^3 and
 //!   f(x) = 6 (pi + 2 asin x) / m^3/2 + 12 x / m, with m = 1 - x^2; g = 12 pi / ((2 + eps^2) m^1/2) and w = 24 eps / ((2 + eps^2) m), those of
@@ -435,16 +435,16 @@ mod tests {
         size([a[0] - b[0], a[1] - b[1]])
     }
 
-    /// Compares with `exact`: along and across within `numerical` of themselves; elsewhere within 12 % of themselves or of the force
+    /// Compares with `exact`: along and across within `numerical` of themselves; elsewhere within 14 % of themselves or of the force
     /// across.
     fn compare(film: &Film, ratio: f64, numerical: f64, exact: impl Fn(f64) -> [f64; 2]) {
         let across = size(exact(0.5 * PI));
-        for degrees in [0.0, 30.0, 60.0, 80.0, 90.0, 100.0, 120.0, 150.0, 180.0_f64] {
+        for degrees in [0.0, 30.0, 60.0, 80.0, 85.0, 90.0, 95.0, 100.0, 120.0, 150.0, 180.0_f64] {
             let angle = degrees.to_radians();
             let (got, exact) = (law(film, ratio, angle), exact(angle));
             let bound = match degrees % 90.0 {
                 0.0 => numerical * size(exact),
-                _ => 0.12 * size(exact).max(across),
+                _ => 0.14 * size(exact).max(across),
             };
             assert!(apart(got, exact) < bound, "{film:?} {ratio} {degrees}: {got:?} against {exact:?}");
         }
@@ -461,7 +461,7 @@ mod tests {
     #[test]
     fn the_force_on_a_pin_is_that_of_the_film_in_half_a_long_bearing() {
         let [_, pin] = films();
-        for ratio in [0.02, 0.3, 0.6, 0.9, 0.98] {
+        for ratio in [0.02, 0.3, 0.6, 0.9, 0.98, 0.985, 0.998] {
             compare(&pin, ratio, 1e-8, |angle| long_bearing(ratio, angle));
         }
     }

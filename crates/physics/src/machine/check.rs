@@ -3,7 +3,8 @@
 use std::cmp::Ordering;
 
 use super::{
-    Characteristic, Doubt, Drive, ElementKind, JointCoordinate, JointKind, LooseFault, LooseJoint, Machine, Warning,
+    Characteristic, Doubt, Drive, Element, ElementKind, Film, JointCoordinate, JointKind, LooseFault, LooseJoint,
+    Machine, Warning,
 };
 use crate::contact::{self, ApproachSpeed, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
@@ -303,6 +304,15 @@ impl Machine {
         Some(Doubt::Overshoot { table: format!("{what} of {of}"), others, overshoot: *overshoot, units: *units })
     }
 
+    /// The doubt about a film that cannot become as thin as half of its gap.
+    fn thick_film(&self, element: &Element) -> Option<Doubt> {
+        let ElementKind::Film(Film { joint, thickness, .. }) = element.kind else { return None };
+        let joint = &self.loose_joints[joint];
+        let play = joint.contact.clearance;
+        let (film, joint) = (element.name.clone(), joint.name.clone());
+        (play > 0.0 && thickness > 0.5 * play).then_some(Doubt::Film { film, joint, thickness, play })
+    }
+
     /// Length scale of relative tolerances, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
     /// most 1 m. A loop-closing joint counts as a ball joint of the scene's radius, as does a scene without any of these.
     pub fn length_scale(&self) -> f64 {
@@ -371,6 +381,7 @@ impl Machine {
             }
         }
         doubts.extend(self.loose_joints.iter().filter_map(LooseJoint::short_pin).take(MAX_LISTED));
+        doubts.extend(self.elements.iter().filter_map(|element| self.thick_film(element)).take(MAX_LISTED));
         doubts.extend(self.step_warning());
         doubts.extend(self.tolerance_warning());
         doubts.extend(self.overshoot_warning());

@@ -60,6 +60,22 @@ pub enum Doubt {
         /// L^2/(80 r), m.
         most: f64,
     },
+    /// A film whose least thickness is not small against the play.
+    #[error(
+        "film {film}: its thickness {} is above half of the play {} of joint {joint}, so that even in the middle it is thicker than the gap.",
+        format_quantity(*.thickness, "um"),
+        format_quantity(*.play, "um")
+    )]
+    Film {
+        /// Name of the film.
+        film: String,
+        /// Name of its joint.
+        joint: String,
+        /// Least thickness, m.
+        thickness: f64,
+        /// Radial play, m.
+        play: f64,
+    },
     /// A fixed step too long for the shortest expected impact.
     #[error(
         "solver.step {}: {} {}, which a fixed step this long does not resolve; use {} or less, or solver.method = automatic.",
@@ -180,7 +196,7 @@ impl Warning {
     pub fn key(&self) -> Option<&'static str> {
         match self {
             Self::Doubt(Doubt::Restitution { .. }) => Some("restitution"),
-            Self::Doubt(Doubt::Clearance { .. } | Doubt::ShortPin { .. }) => Some("clearance"),
+            Self::Doubt(Doubt::Clearance { .. } | Doubt::ShortPin { .. } | Doubt::Film { .. }) => Some("clearance"),
             Self::Doubt(Doubt::Step { .. }) => Some("solver.step"),
             Self::Doubt(Doubt::Tolerance { .. }) => Some("solver.tolerance"),
             Self::StiffFriction { .. } => Some("slip_speed_high"),

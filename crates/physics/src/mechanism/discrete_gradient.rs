@@ -276,21 +276,11 @@ impl DiscreteGradient {
             let bodies = element.0.map(|end| end.body);
             std::iter::repeat_n(bodies, rows_of(element))
         });
-        let before = |all: &[([Anchor; 2], usize)], count: &dyn Fn(&([Anchor; 2], usize)) -> usize, from: usize| {
-            let mut next = from;
-            all.iter()
-                .map(|element| {
-                    let first = next;
-                    next += count(element);
-                    first
-                })
-                .collect::<Vec<usize>>()
-        };
         let coupled = CoupledRows::new(model, n, within, of_contacts.chain(of_elements))?;
         let (rows, bandwidth) = (coupled.spans.len(), coupled.bandwidth);
         Ok(Self {
-            first_row: before(elements, &rows_of, contacts),
-            first_station: before(elements, &|(_, stations)| *stations, 0),
+            first_row: places(contacts, elements.iter().map(rows_of)),
+            first_station: places(0, elements.iter().map(|(_, rows)| *rows)),
             stations: vec![[Vec3::zeros(); 3]; elements.iter().map(|(_, stations)| stations).sum()],
             max_mobility: elements.iter().map(|(ends, _)| max_mobility(model, ends)).collect(),
             band: Band::with_capacity(rows, bandwidth),
@@ -691,6 +681,11 @@ impl DiscreteGradient {
             add_impulse(&mut self.mean, &self.weighted[row.index], spans, &(row.force * half));
         }
     }
+}
+
+/// Where each of several ranges with these lengths begins, one after the other from `first`.
+fn places(first: usize, lengths: impl Iterator<Item = usize>) -> Vec<usize> {
+    lengths.scan(first, |next, length| Some(std::mem::replace(next, *next + length))).collect()
 }
 
 /// Upper bounds on the effect of a force, 1/kg, and of a torque, 1/(kg m^2), between two points on their relative motion. They
