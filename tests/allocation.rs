@@ -117,7 +117,7 @@ fn joints_with_two_degrees_of_freedom_closing_joints_and_every_kind_of_play_allo
         include_str!("fuzz/corpus/good-block.toml"),
         include_str!("fuzz/corpus/good-planar-play.toml"),
         include_str!("fuzz/corpus/good-wear.toml"),
-        include_str!("fuzz/corpus/good-films.toml"),
+        include_str!("fuzz/corpus/good-lubricants.toml"),
     ];
     for text in corpus {
         for method in METHODS {

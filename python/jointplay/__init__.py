@@ -11,7 +11,7 @@ program `jointplay`: compare `Run.hash` with the state hash that `jointplay run`
 
 from . import _native
 from ._compare import Comparison, compare
-from ._control import Elements, Film, Linearisation, Load, Motor, Spring
+from ._control import Elements, Linearisation, Load, Lubricant, Motor, Spring
 from ._fit import FitStart, ParameterFit, fit
 from ._geometry import Shape
 from ._render import render
@@ -49,7 +49,6 @@ __all__ = [
     "Elements",
     "Ends",
     "Estimate",
-    "Film",
     "FitChoice",
     "FitStart",
     "Fits",
@@ -60,6 +59,7 @@ __all__ = [
     "JointplayError",
     "Linearisation",
     "Load",
+    "Lubricant",
     "Motor",
     "OmissionWarning",
     "OptionError",

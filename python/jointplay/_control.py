@@ -1,4 +1,4 @@
-"""Motors, loads, springs and films of a running simulation, and its motion linearised."""
+"""Motors, loads, springs and lubricants of a running simulation, and its motion linearised."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Spring(Element):
     position: float = Element._number("position", "Coordinate without stretch, m or rad; of a spring on a joint.")
 
 
-class Film(Element):
+class Lubricant(Element):
     """A lubricant in a joint with play."""
 
     __slots__ = ()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from ._control import Elements, Film, Linearisation, Load, Motor, Spring
+from ._control import Elements, Linearisation, Load, Lubricant, Motor, Spring
 from ._geometry import matrices
 from ._link import frame_of
 from ._scene import impact_table
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Numbers = float | Sequence[float] | NDArray[np.float64]
     Positions = Mapping[str, Numbers] | Sequence[float] | NDArray[np.float64]
 
-E = TypeVar("E", Motor, Load, Spring, Film)
+E = TypeVar("E", Motor, Load, Spring, Lubricant)
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -51,7 +51,7 @@ class Frame:
     """Normal force on each ball, pin or block, N, or the reaction of an ideal joint: shape (joints, 3)."""
     friction_forces: NDArray[np.float64]
     """Friction force on each ball, pin or block, N: shape (joints, 3)."""
-    film_forces: NDArray[np.float64]
+    lubricant_forces: NDArray[np.float64]
     """Force of the lubricant on each ball or pin, N: shape (joints, 3)."""
     axial: NDArray[np.float64]
     """Displacement of each pin or block along the joint's axis, m; 0 for a ball: shape (joints,)."""
@@ -134,9 +134,9 @@ class Simulation(_Guarded):
         return self._by_name(Spring, "spring", "joint_spring")
 
     @property
-    def films(self) -> Elements[Film]:
-        """Films of lubricants by name: `films["oil"].viscosity = 0.02`."""
-        return self._by_name(Film, "film")
+    def lubricants(self) -> Elements[Lubricant]:
+        """Lubricants by name: `lubricants["oil"].viscosity = 0.02`."""
+        return self._by_name(Lubricant, "lubricant")
 
     def _by_name(self, kind: type[E], *kinds: str) -> Elements[E]:
         own: Elements[E] | None = self._elements_of.get(kind)

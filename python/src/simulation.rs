@@ -395,7 +395,7 @@ impl PySimulation {
         all.set_item("eccentricities", vectors(py, frame.joints.iter().map(|joint| joint.eccentricity)))?;
         all.set_item("normal_forces", vectors(py, frame.joints.iter().map(|joint| joint.normal_force)))?;
         all.set_item("friction_forces", vectors(py, frame.joints.iter().map(|joint| joint.friction_force)))?;
-        all.set_item("film_forces", vectors(py, frame.joints.iter().map(|joint| joint.film_force)))?;
+        all.set_item("lubricant_forces", vectors(py, frame.joints.iter().map(|joint| joint.lubricant_force)))?;
         let axial = PyArray1::from_iter(py, frame.joints.iter().map(|joint| joint.axial));
         all.set_item("axial", control::read_only(axial))?;
         let tilts = PyArray1::from_iter(py, frame.joints.iter().map(|joint| joint.tilt));

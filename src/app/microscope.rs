@@ -349,9 +349,9 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
     }
     let help = format!("On the {part}; of an ideal joint the whole reaction");
     rows.push(("Normal force", value::quantity(report.normal_force.norm(), "N", 4), help));
-    if report.film_force.norm() > 0.0 {
+    if report.lubricant_force.norm() > 0.0 {
         let help = format!("Force of the lubricant on the {part}");
-        rows.push(("Film force", value::quantity(report.film_force.norm(), "N", 4), help));
+        rows.push(("Lubricant force", value::quantity(report.lubricant_force.norm(), "N", 4), help));
     }
     let ratio = |number: f64| value::number(number, 4);
     let impact = magnified.impact;

@@ -288,8 +288,8 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
         .iter()
         .zip(&frame.joints)
         .map(|(joint, report)| match report.state {
-            ContactMode::Free if report.film_force.norm() > 0.0 => {
-                format!("{}  film {}", joint.name, newtons(&report.film_force))
+            ContactMode::Free if report.lubricant_force.norm() > 0.0 => {
+                format!("{}  lubricant {}", joint.name, newtons(&report.lubricant_force))
             }
             ContactMode::Free => format!("{}  free", joint.name),
             ContactMode::Ideal => {
@@ -360,14 +360,16 @@ fn legend(painter: &Painter, place: Rect, scale: f32, legend: &Legend, is_new: b
     }
     let hues = [
         ("normal", legend.normal, false),
-        ("film", legend.film, false),
+        ("lubricant", legend.lubricant, false),
         ("last peak", legend.normal.filter(|_| legend.peaks), true),
         ("friction", legend.friction, false),
     ];
+    // Behind the longest name of the first column.
+    let second = if legend.lubricant.is_some() { 90.0 } else { 76.0 };
     let rows = [place.top() + 9.0, place.bottom() - 11.0];
     let corner = (place.right() - 24.0 - reserved - NAMES_WIDTH).max(place.left());
     for (k, (name, hue, hollow)) in hues.into_iter().filter_map(|(n, h, o)| h.map(|h| (n, h, o))).enumerate() {
-        let tail = pos2(corner + [0.0, 76.0][k / 2], rows[k % 2]);
+        let tail = pos2(corner + [0.0, second][k / 2], rows[k % 2]);
         if hollow {
             let outline = [
                 vec2(0.0, -2.0),
@@ -585,7 +587,7 @@ mod tests {
             normal: Some(ink),
             peaks: true,
             friction: Some(ink),
-            film: Some(ink),
+            lubricant: Some(ink),
         }
     }
 

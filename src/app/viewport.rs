@@ -1112,8 +1112,8 @@ fn describe(ui: &mut Ui, player: &Player, picked: ScenePart) {
                 ui.label(value::contact(joint.state, spec.kind.parts()[0]));
                 row(ui, "Normal force", joint.normal_force.norm(), "N");
                 row(ui, "Friction force", joint.friction_force.norm(), "N");
-                if joint.film_force.norm() > 0.0 {
-                    row(ui, "Film force", joint.film_force.norm(), "N");
+                if joint.lubricant_force.norm() > 0.0 {
+                    row(ui, "Lubricant force", joint.lubricant_force.norm(), "N");
                 }
                 if joint.state != ContactMode::Ideal {
                     row(ui, "Eccentricity", joint.eccentricity.norm(), "mm");

@@ -67,7 +67,7 @@ impl Advice {
             }
             Warning::Doubt(Doubt::Clearance { .. }) => ("very small".to_owned(), text.clone(), None),
             Warning::Doubt(Doubt::ShortPin { .. }) => ("very large".to_owned(), text.clone(), None),
-            Warning::Doubt(Doubt::Film { .. }) => ("small for its film".to_owned(), text.clone(), None),
+            Warning::Doubt(Doubt::Lubricant { .. }) => ("small for its film".to_owned(), text.clone(), None),
             Warning::Doubt(Doubt::Step { joint, step, duration, sliding, recommended }) => {
                 let time = |seconds: f64| format_quantity_digits(seconds, "us", 3);
                 let what = if *sliding { "friction reverses the sliding" } else { "an impact is over" };

@@ -169,10 +169,10 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
                 }
             }
         });
-        let film = to_f32(&report.film_force);
+        let film = to_f32(&report.lubricant_force);
         let from = joint.ball_centre - film.normalize_or_zero() * joint.ball_radius;
         if let Some(arrow) = options.normal.then(|| arrow(film, from)).flatten() {
-            arrow.push(&mut out.arrows, palette.film);
+            arrow.push(&mut out.arrows, palette.lubricant);
         }
     }
     for report in external {
@@ -222,7 +222,8 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         force: mark * reference,
         fraction: arrow_length(mark * reference, reference, options.scaling).0,
     };
-    let has_films = shot.scene.machine.elements.iter().any(|element| matches!(element.kind, ElementKind::Film(_)));
+    let is_lubricated =
+        shot.scene.machine.elements.iter().any(|element| matches!(element.kind, ElementKind::Lubricant(_)));
     let are_balls = joints.iter().all(DrawnJoint::is_ball);
     out.legend = Some(Legend {
         on: if are_balls { "ball" } else { "carried part" },
@@ -234,7 +235,7 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         normal: options.normal.then_some(palette.normal),
         peaks: draws_peaks,
         friction: options.friction.then_some(palette.friction),
-        film: (options.normal && has_films).then_some(palette.film),
+        lubricant: (options.normal && is_lubricated).then_some(palette.lubricant),
     });
 }
 

@@ -379,7 +379,7 @@ impl SceneView {
             ElementKind::Motor(motor) => {
                 push_motor(motor, report, (scene, frame), &style, solid, lines);
             }
-            ElementKind::Load(_) | ElementKind::Film(_) => {}
+            ElementKind::Load(_) | ElementKind::Lubricant(_) => {}
         }
     }
 

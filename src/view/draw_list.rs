@@ -257,7 +257,7 @@ pub struct Legend {
     /// Colour of friction; `None` if it is not drawn.
     pub friction: Option<Colour>,
     /// Colour of the forces of lubricants; `None` if there are none.
-    pub film: Option<Colour>,
+    pub lubricant: Option<Colour>,
 }
 
 /// The colour legend of a wear map.

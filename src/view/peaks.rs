@@ -162,7 +162,7 @@ impl PeakMarks {
             joint.impact = joint.impact.filter(|impact| now - impact.time < self.fade);
         }
         let half_lives = passed / (SCALE_HALF_LIFE * self.fade);
-        let forces = frame.joints.iter().flat_map(|joint| [joint.normal_force, joint.film_force]);
+        let forces = frame.joints.iter().flat_map(|joint| [joint.normal_force, joint.lubricant_force]);
         let current = forces.map(|force| force.norm() as f32).filter(|force| force.is_finite());
         let marked = self.joints.iter().filter_map(|joint| joint.impact);
         self.largest = current

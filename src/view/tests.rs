@@ -214,13 +214,13 @@ fn the_force_of_a_film_is_an_arrow_from_the_side_that_it_pushes() {
         socket = { body = "world" }
         ball = { body = "ball" }
         "#;
-    let film = "[[film]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"50 mPa s\"\n";
+    let film = "[[lubricant]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"50 mPa s\"\n";
     let mut options = ViewOptions { triad: false, ..Default::default() };
     options.arrows.reference = Some(100.0);
     let (scene, frame) = started(&format!("{dry}{film}"), &[]);
     let drawn = list(&scene, &frame, &options);
     let force = to_f32(&frame.elements[0].force);
-    assert_eq!(to_f32(&frame.joints[0].film_force), force);
+    assert_eq!(to_f32(&frame.joints[0].lubricant_force), force);
     assert!((40.0..100.0).contains(&force.length()), "{force}");
     let [shaft, head] = [Mesh::Cylinder, Mesh::Cone].map(|mesh| drawn.arrows.by_mesh[mesh.index()][0]);
     assert_eq!(drawn.arrows.by_mesh[Mesh::Cone.index()].len(), 1);
@@ -234,16 +234,16 @@ fn the_force_of_a_film_is_an_arrow_from_the_side_that_it_pushes() {
     assert!((0.7..=1.0).contains(&seen), "{seen}");
     let from = place(ball(&drawn, 0.010)) - force.normalize() * 0.010;
     assert!(place(&shaft).distance(from) < 1e-6, "{} {from}", place(&shaft));
-    assert!(legend.film.is_some());
+    assert!(legend.lubricant.is_some());
     options.arrows.normal = false;
     options.arrows.friction = true;
     let hidden = list(&scene, &frame, &options);
     assert!(hidden.arrows.by_mesh[Mesh::Cone.index()].is_empty());
-    assert_eq!(hidden.legend.expect("a legend").film, None);
+    assert_eq!(hidden.legend.expect("a legend").lubricant, None);
     // Without a film, nothing of it.
     options.arrows.normal = true;
     let (scene, frame) = started(dry, &[]);
-    assert_eq!(list(&scene, &frame, &options).legend.expect("a legend").film, None);
+    assert_eq!(list(&scene, &frame, &options).legend.expect("a legend").lubricant, None);
 }
 
 #[test]

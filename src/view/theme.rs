@@ -134,7 +134,7 @@ pub struct Palette {
     /// Friction arrows.
     pub friction: Colour,
     /// Arrows of the forces of lubricants.
-    pub film: Colour,
+    pub lubricant: Colour,
     /// Arrows of external forces.
     pub external: Colour,
     /// Halo of a joint that was hit.
@@ -175,7 +175,7 @@ impl Palette {
             text: pick(dark, 0x1E2A36, 0xE6EBF0),
             normal: pick(dark, 0xB83818, 0xFF6B6B),
             friction: pick(dark, 0x1769C9, 0x4DABF7),
-            film: pick(dark, 0xB07900, 0xFFD43B),
+            lubricant: pick(dark, 0xB07900, 0xFFD43B),
             external: pick(dark, 0x00796B, 0x2FD6BE),
             flash: pick(dark, 0xFFC61A, 0xFFE27A),
             gravity: pick(dark, 0x6B3FA0, 0xB197FC),

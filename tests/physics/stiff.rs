@@ -211,12 +211,12 @@ pub const ELEMENT_CASES: [(&str, &str); 8] = [
          [[joint]]\nname = \"bob\"\nkind = \"free\"\nchild = \"bob\"\n\
          start = { position = \"20.05 30.03 0.06 mm\", velocity = \"3 5 9 mm/s\", angular_velocity = \"2 -3 5 rad/s\" }\n\
          [[ball_joint]]\nname = \"S\"\nsocket = { body = \"world\", at = \"20 30 0 mm\" }\nball = { body = \"bob\" }\n\
-         [[film]]\nname = \"t\"\njoint = \"S\"\nviscosity = \"100 mPa s\"\n\
+         [[lubricant]]\nname = \"t\"\njoint = \"S\"\nviscosity = \"100 mPa s\"\n\
          [[body]]\nname = \"pin\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n\
          [[joint]]\nname = \"P\"\nkind = \"revolute\"\nparent = \"rod\"\nchild = \"pin\"\naxis = [1, 2, 3]\n\
          play = { radial = \"0.1 mm\", length = \"24 mm\", radius = \"10 mm\" }\n\
          start = { velocity = \"3 rad/s\", offset = \"0.04 0.03 0.02 mm\", offset_velocity = \"2 3 5 mm/s\", tilt_velocity = \"0.1 0.2 0.3 rad/s\" }\n\
-         [[film]]\nname = \"u\"\njoint = \"P\"\nviscosity = \"100 mPa s\"\n",
+         [[lubricant]]\nname = \"u\"\njoint = \"P\"\nviscosity = \"100 mPa s\"\n",
     ),
     (
         "motors",

@@ -13,8 +13,8 @@ use super::read_joints::{allowed_joints, read_coordinate};
 use super::*;
 use jointplay_physics::interpolate::Interpolation;
 use jointplay_physics::machine::{
-    Bushing, Characteristic, Drive, Element, ElementKind, Film, Harmonic, JointCoordinate, JointSpring, Load, LoadAxes,
-    LooseKind, Motor, Quat, Spring, SpringSide, Stop, Tyre, Vec3,
+    Bushing, Characteristic, Drive, Element, ElementKind, Harmonic, JointCoordinate, JointSpring, Load, LoadAxes,
+    LooseKind, Lubricant, Motor, Quat, Spring, SpringSide, Stop, Tyre, Vec3,
 };
 use jointplay_physics::suggest::nearest;
 use jointplay_physics::units::Dimension as D;
@@ -32,7 +32,7 @@ pub(super) static ELEMENTS: LazyLock<Vec<(&FileTable, ReadKind)>> = LazyLock::ne
         (&BUSHING, read_bushing),
         (&MOTOR, read_motor),
         (&TYRE, read_tyre),
-        (&FILM, read_film),
+        (&LUBRICANT, read_lubricant),
     ]
 });
 
@@ -322,9 +322,9 @@ static TYRE: LazyLock<FileTable> = LazyLock::new(|| {
     )
 });
 
-static FILM: FileTable = FileTable::new(
-    "film",
-    "[[film]]",
+static LUBRICANT: FileTable = FileTable::new(
+    "lubricant",
+    "[[lubricant]]",
     "lubricant between ball and socket, or pin and bearing, of a joint with play, beside its contacts",
     &[
         NAME,
@@ -339,10 +339,10 @@ static FILM: FileTable = FileTable::new(
             "thickness",
             ValueType::Number(D::Length, (1e-9, 1e-3)),
             "\"1 um\"",
-            "thickness below which it does not fall, about the roughness of both surfaces: there dry contact takes over",
+            "thickness below which its film does not fall, about the roughness of both surfaces: there dry contact takes over",
         )
         .default_value(1e-6),
-        key("length", ValueType::Number(D::Length, (1e-6, 1e3)), "\"20 mm\"", "its length along a pin; a ball has none")
+        key("length", ValueType::Number(D::Length, (1e-6, 1e3)), "\"20 mm\"", "length of its film along a pin; around a ball it has none")
             .default_text("`length` of the joint's `play`"),
     ],
 );
@@ -635,7 +635,7 @@ fn read_tyre(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> 
     Ok(ElementKind::Tyre(tyre))
 }
 
-fn read_film(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
+fn read_lubricant(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
     let node = reader.section.require("joint")?;
     let name = &*node.joint()?;
     let joints = || reader.scene.machine.loose_joints.iter();
@@ -643,7 +643,7 @@ fn read_film(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> 
     let found = joints().enumerate().find(|(_, joint)| joint.name == name);
     let Some((index, joint)) = found.filter(|(_, joint)| holds(&joint.kind)) else {
         let wrong = match found {
-            Some(_) => "a block in its guide holds no film".to_owned(),
+            Some(_) => "a block in its guide holds no lubricant".to_owned(),
             None => "no such joint with play".to_owned(),
         };
         let names = || joints().filter(|joint| holds(&joint.kind)).map(|joint| joint.name.as_str());
@@ -663,10 +663,10 @@ fn read_film(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> 
         }
         LooseKind::Pin(_) => {}
         LooseKind::Ball | LooseKind::Slide(_) => {
-            reader.section.refuse("length", "a film around a ball has the size of that")?;
+            reader.section.refuse("length", "around a ball it has the size of that")?;
         }
     }
-    Ok(ElementKind::Film(Film {
+    Ok(ElementKind::Lubricant(Lubricant {
         joint: index,
         viscosity: reader.number("viscosity")?,
         thickness: reader.number("thickness")?,

@@ -34,7 +34,7 @@ pub(in crate::app) fn plot_of(quantity: Quantity) -> QuantityPlot {
     let (label, unit, kind, help) = match quantity {
         Quantity::NormalForce => ("Normal force", ("N", 1.0), FromZero, "Size of the normal force on each ball; of the whole reaction where a joint is ideal."),
         Quantity::FrictionForce => ("Friction force", ("N", 1.0), FromZero, "Size of the friction force on each ball."),
-        Quantity::FilmForce => ("Film force", ("N", 1.0), FromZero, "Size of the force of the lubricant on each ball."),
+        Quantity::LubricantForce => ("Lubricant force", ("N", 1.0), FromZero, "Size of the force of the lubricant on each ball."),
         Quantity::Eccentricity => ("Eccentricity", ("mm", 1e-3), FromZeroWithClearances, "Distance of each ball's centre from its socket's centre. Contact begins at the clearance; at a wall that wears by direction, farther out by what has worn off there."),
         Quantity::Penetration => ("Indentation", ("µm", 1e-6), Curves, "How deep each ball presses into its socket; below zero there is a gap."),
         Quantity::Position => ("Position", ("mm", 1e-3), Curves, "Origin of the output body in world axes."),

@@ -246,7 +246,7 @@ impl Element {
                 N::TorqueZ => Some(&mut load.torque.z),
                 _ => None,
             },
-            ElementKind::Film(film) => (number == N::Viscosity).then_some(&mut film.viscosity),
+            ElementKind::Lubricant(film) => (number == N::Viscosity).then_some(&mut film.viscosity),
             ElementKind::Stop(_) | ElementKind::Bushing(_) | ElementKind::Tyre(_) => None,
         }
     }

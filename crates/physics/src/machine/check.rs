@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use super::{
-    Characteristic, Doubt, Drive, Element, ElementKind, Film, JointCoordinate, JointKind, LooseFault, LooseJoint,
+    Characteristic, Doubt, Drive, Element, ElementKind, JointCoordinate, JointKind, LooseFault, LooseJoint, Lubricant,
     Machine, Warning,
 };
 use crate::contact::{self, ApproachSpeed, FrictionLaw, NormalLaw};
@@ -66,9 +66,9 @@ pub enum MachineFault {
         /// Name of the element.
         element: String,
     },
-    /// A film that is in no ball or pin with a size.
-    #[error("film {element} is in no joint with play that holds one: a ball, or a pin with a length")]
-    NoFilm {
+    /// A lubricant that is in no ball or pin with a size.
+    #[error("lubricant {element} is in no joint with play that holds one: a ball, or a pin with a length")]
+    NoLubricant {
         /// Name of the element.
         element: String,
     },
@@ -199,10 +199,10 @@ impl Machine {
             if element.coordinate().is_some_and(|on| !has(on)) {
                 return Err(MachineFault::NoCoordinate { element: element.name.clone() });
             }
-            if let ElementKind::Film(film) = &element.kind
-                && !film.is_held(self)
+            if let ElementKind::Lubricant(lubricant) = &element.kind
+                && !lubricant.is_held(self)
             {
-                return Err(MachineFault::NoFilm { element: element.name.clone() });
+                return Err(MachineFault::NoLubricant { element: element.name.clone() });
             }
             element.points(self).iter().try_for_each(|point| exists(&element.name, point.body))?;
         }
@@ -306,11 +306,11 @@ impl Machine {
 
     /// The doubt about a film that cannot become as thin as half of its gap.
     fn thick_film(&self, element: &Element) -> Option<Doubt> {
-        let ElementKind::Film(Film { joint, thickness, .. }) = element.kind else { return None };
+        let ElementKind::Lubricant(Lubricant { joint, thickness, .. }) = element.kind else { return None };
         let joint = &self.loose_joints[joint];
         let play = joint.contact.clearance;
-        let (film, joint) = (element.name.clone(), joint.name.clone());
-        (play > 0.0 && thickness > 0.5 * play).then_some(Doubt::Film { film, joint, thickness, play })
+        let (lubricant, joint) = (element.name.clone(), joint.name.clone());
+        (play > 0.0 && thickness > 0.5 * play).then_some(Doubt::Lubricant { lubricant, joint, thickness, play })
     }
 
     /// Length scale of relative tolerances, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at

@@ -36,7 +36,7 @@ impl Machine {
         let points = self.elements.iter().map(|element| element.points(self));
         let of_elements = points.zip(&self.elements).flat_map(|(points, element)| {
             let bodies = [0, 1].map(|n| points.get(n).and_then(|point| point.body));
-            std::iter::repeat_n(bodies, if matches!(element.kind, ElementKind::Film(_)) { 3 } else { 2 })
+            std::iter::repeat_n(bodies, if matches!(element.kind, ElementKind::Lubricant(_)) { 3 } else { 2 })
         });
         let rows = of_joints.chain(of_elements).map(|bodies| bodies.map(|body| body.and_then(|body| tree_of[body])));
         let rows: Vec<[Option<usize>; 2]> = rows.collect();

@@ -60,15 +60,15 @@ pub enum Doubt {
         /// L^2/(80 r), m.
         most: f64,
     },
-    /// A film whose least thickness is not small against the play.
+    /// A lubricant whose least thickness is not small against the play.
     #[error(
-        "film {film}: its thickness {} is above half of the play {} of joint {joint}, so that even in the middle it is thicker than the gap.",
+        "lubricant {lubricant}: its thickness {} is above half of the play {} of joint {joint}, so that even in the middle it is thicker than the gap.",
         format_quantity(*.thickness, "um"),
         format_quantity(*.play, "um")
     )]
-    Film {
-        /// Name of the film.
-        film: String,
+    Lubricant {
+        /// Its name.
+        lubricant: String,
         /// Name of its joint.
         joint: String,
         /// Least thickness, m.
@@ -196,7 +196,9 @@ impl Warning {
     pub fn key(&self) -> Option<&'static str> {
         match self {
             Self::Doubt(Doubt::Restitution { .. }) => Some("restitution"),
-            Self::Doubt(Doubt::Clearance { .. } | Doubt::ShortPin { .. } | Doubt::Film { .. }) => Some("clearance"),
+            Self::Doubt(Doubt::Clearance { .. } | Doubt::ShortPin { .. } | Doubt::Lubricant { .. }) => {
+                Some("clearance")
+            }
             Self::Doubt(Doubt::Step { .. }) => Some("solver.step"),
             Self::Doubt(Doubt::Tolerance { .. }) => Some("solver.tolerance"),
             Self::StiffFriction { .. } => Some("slip_speed_high"),

@@ -33,7 +33,7 @@ pub enum ElementKind {
     /// Tyre of a wheel on ground that may move.
     Tyre(Tyre),
     /// Lubricant in a joint with play.
-    Film(Film),
+    Lubricant(Lubricant),
 }
 
 /// Joint coordinate on which an element acts.
@@ -186,14 +186,14 @@ pub struct Tyre {
     pub height: f64,
 }
 
-/// Film of a lubricant between ball and socket, or pin and bearing, of a joint with play; without effect while that is ideal.
+/// Lubricant between ball and socket, or pin and bearing, of a joint with play; without effect while that is ideal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Film {
+pub struct Lubricant {
     /// Index of the joint among [`super::Machine::loose_joints`].
     pub joint: usize,
     /// Dynamic viscosity, Pa s.
     pub viscosity: f64,
-    /// Thickness that the film does not fall below, as the surfaces are rough, m.
+    /// Thickness below which its film does not fall, as the surfaces are rough, m.
     pub thickness: f64,
     /// Length of the film along a pin, m; `None` for that of the joint.
     pub length: Option<f64>,
@@ -270,8 +270,8 @@ impl Characteristic {
     }
 }
 
-impl Film {
-    /// Whether its joint can hold it, and its numbers are a film's.
+impl Lubricant {
+    /// Whether its joint can hold it, and its numbers are a lubricant's.
     pub(super) fn is_held(&self, machine: &Machine) -> bool {
         let positive = |value: f64| value > 0.0 && value.is_finite();
         let holds = |joint: &LooseJoint| match joint.kind {
@@ -356,7 +356,7 @@ impl Element {
                 law: tyre.ground.as_ref().map(|ground| ("ground", ground)),
                 ..of("tyre", Place::Point(tyre.on))
             },
-            ElementKind::Film(film) => of("film", Place::Loose(film.joint)),
+            ElementKind::Lubricant(film) => of("lubricant", Place::Loose(film.joint)),
         }
     }
 
@@ -370,7 +370,7 @@ impl Element {
             | ElementKind::JointSpring(_)
             | ElementKind::Stop(_)
             | ElementKind::Bushing(_)
-            | ElementKind::Film(_) => None,
+            | ElementKind::Lubricant(_) => None,
         }
     }
 

@@ -162,7 +162,7 @@ pub struct JointReport {
     /// Friction force on the ball, N.
     pub friction_force: Vec3,
     /// Force of the lubricant in it on the ball, N.
-    pub film_force: Vec3,
+    pub lubricant_force: Vec3,
     /// Where the forces act on the ball, Z_j + r n, m.
     pub contact_point: Vec3,
     /// Sliding speed used by the friction law, m/s.

@@ -45,7 +45,7 @@ pub(super) fn fill(
     out.elements.clear();
     out.elements.extend(mechanism.element_reports(time));
     for film in mechanism.films() {
-        out.joints[film.joint].film_force += out.elements[film.element].force;
+        out.joints[film.joint].lubricant_force += out.elements[film.element].force;
     }
     let (kinetic, gravitational) = mechanism.energies();
     out.kinetic = kinetic;

@@ -33,7 +33,7 @@ pub struct Station {
 }
 
 impl Film {
-    pub fn new(film: &machine::Film, machine: &Machine, model: &Model) -> Self {
+    pub fn new(film: &machine::Lubricant, machine: &Machine, model: &Model) -> Self {
         let joint = &machine.loose_joints[film.joint];
         let radius = joint.contact.ball_radius;
         let length = match joint.kind {

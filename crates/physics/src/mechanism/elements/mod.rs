@@ -361,7 +361,7 @@ impl FilmPlace {
     /// That of element `index`, if it is one.
     pub(super) fn of(machine: &Machine, index: usize, element: &Element) -> Option<Self> {
         match element.kind {
-            ElementKind::Film(machine::Film { joint, thickness, .. })
+            ElementKind::Lubricant(machine::Lubricant { joint, thickness, .. })
                 if machine.loose_joints[joint].contact.clearance > 0.0 =>
             {
                 Some(Self { element: index, joint, thickness })
@@ -388,7 +388,7 @@ pub(super) fn element_of(machine: &Machine, model: &Model, element: &Element) ->
             Box::new(OnCoordinate { on: coordinate(motor.on), law: Motor { motor: motor.clone(), target: law } })
         }
         ElementKind::Tyre(tyre) => Box::new(Tyre::new(tyre, anchor(&tyre.on), law)),
-        ElementKind::Film(film) => Box::new(Film::new(film, machine, model)),
+        ElementKind::Lubricant(film) => Box::new(Film::new(film, machine, model)),
     }
 }
 

@@ -19,7 +19,7 @@ use crate::words::words;
 pub enum Quantity {
     NormalForce,
     FrictionForce,
-    FilmForce,
+    LubricantForce,
     Eccentricity,
     Penetration,
     Position,
@@ -39,7 +39,7 @@ pub enum Quantity {
 words!(Quantity {
     NormalForce => "normal-force",
     FrictionForce => "friction-force",
-    FilmForce => "film-force",
+    LubricantForce => "lubricant-force",
     Eccentricity => "eccentricity",
     Penetration => "penetration",
     Position => "position",
@@ -222,7 +222,7 @@ impl SignalSource {
 pub enum Needed {
     Nothing,
     Elements,
-    Films,
+    Lubricants,
 }
 
 impl Needed {
@@ -231,7 +231,9 @@ impl Needed {
         match self {
             Self::Nothing => true,
             Self::Elements => !machine.elements.is_empty(),
-            Self::Films => machine.elements.iter().any(|element| matches!(element.kind, ElementKind::Film(_))),
+            Self::Lubricants => {
+                machine.elements.iter().any(|element| matches!(element.kind, ElementKind::Lubricant(_)))
+            }
         }
     }
 }
@@ -286,7 +288,7 @@ const fn of(of: Needed, signal: Signal) -> Signal {
 pub(super) const TABLE: &[Signal] = &[
     in_plot_and_run(Q::NormalForce, 2, on_request("@.normal", "@_normal_N", Joint(|joint| joint.normal_force.norm()), "size of the normal force on the carried part; of an ideal joint, of its reaction")),
     in_plot(Q::FrictionForce, on_request("@.friction.size", "@_friction_N", Joint(|joint| joint.friction_force.norm()), "size of the friction force on the carried part")),
-    of(Needed::Films, in_plot(Q::FilmForce, on_request("@.film", "@_film_N", Joint(|joint| joint.film_force.norm()), "size of the force of the lubricant on the carried part"))),
+    of(Needed::Lubricants, in_plot(Q::LubricantForce, on_request("@.lubricant", "@_lubricant_N", Joint(|joint| joint.lubricant_force.norm()), "size of the force of the lubricant on the carried part"))),
     in_plot_and_run(Q::Eccentricity, 1, on_request("@.eccentricity.size", "@_eccentricity_m", Joint(|joint| joint.eccentricity.norm()), "distance of the ball's centre from the socket's; of a pin or a block, across its axis")),
     in_run(5, on_request("@.eccentricity.#", "@_e#_m", JointAxes(|joint| joint.eccentricity), "ball's centre from the socket's; of a pin or a block, across its axis")),
     in_plot_and_run(Q::Penetration, 5, on_request("@.penetration", "@_penetration_m", Joint(|joint| joint.penetration), "depth in the wall; negative where there is a gap")),

@@ -12,7 +12,7 @@ use jointplay_physics::simulate::{Effect, ElementReport};
 use jointplay_scene::{LiveScene, Scene};
 
 /// A film of 50 mPa s, so that it never thins out, in joint S.
-const OIL: &str = "[[film]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"50 mPa s\"\nthickness = \"1 nm\"\n";
+const OIL: &str = "[[lubricant]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"50 mPa s\"\nthickness = \"1 nm\"\n";
 
 /// f(x) of a ball (Goenka 1980).
 fn closing(x: f64) -> f64 {
@@ -170,7 +170,7 @@ fn pair(joint: &str, far: f64) -> String {
         mass = "0.1 kg"
         inertia = "2e-5 3e-5 4e-5 kg m^2"
         {joint}
-        [[film]]
+        [[lubricant]]
         name = "oil"
         joint = "S"
         viscosity = "20 mPa s"
@@ -251,7 +251,7 @@ fn a_film_far_from_the_origin_acts_as_one_at_it() {
 fn a_ball_thrown_at_its_wall_loses_speed_to_the_film_and_comes_to_rest_in_dry_contact() {
     let contact = "clearance = \"0.1 mm\"\nrestitution = 0.9\nnormal_law = \"gonthier\"";
     let dry = free_ball(0.0, -0.3, -10.0, contact);
-    let wet = dry.clone() + "[[film]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"0.2 mPa s\"\n";
+    let wet = dry.clone() + "[[lubricant]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"0.2 mPa s\"\n";
     let speeds = METHODS.map(|method| {
         let changes = [
             ("solver.method", method),
@@ -293,7 +293,7 @@ fn a_machine_with_films_starts_settled_and_in_equilibrium() {
     // A rod that hangs on a ball, which lies on the wall of its socket.
     let text = jointplay_scene::built_in_text("pendulum").unwrap();
     let name = Scene::parse(text, None, &[]).unwrap().machine.loose_joints[0].name.clone();
-    let film = format!("[[film]]\nname = \"oil\"\njoint = \"{name}\"\nviscosity = \"20 mPa s\"\n");
+    let film = format!("[[lubricant]]\nname = \"oil\"\njoint = \"{name}\"\nviscosity = \"20 mPa s\"\n");
     for start in ["settled", "equilibrium"] {
         let starts = [text.to_owned(), format!("{text}\n{film}")].map(|text| {
             let mut simulation = start_simulation(&text, &[("start", start)]);
@@ -307,7 +307,7 @@ fn a_machine_with_films_starts_settled_and_in_equilibrium() {
 fn a_stiff_film_slows_neither_implicit_nor_automatic_steps() {
     // A ball of 2.4 g in a film of 10 um: explicit steps would be of some nanoseconds.
     let text = free_ball(0.002, 1e-4, -10.0, "clearance = \"10 um\"")
-        + "[[film]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"4 mPa s\"\n";
+        + "[[lubricant]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"4 mPa s\"\n";
     let text = replaced(&text, "\"0.1 kg\"", "\"2.4 g\"");
     for method in ["radau5", "automatic", "discrete-gradient"] {
         let mut simulation = start_simulation(&text, &[("solver.method", method)]);
@@ -332,7 +332,7 @@ fn discrete_gradient_steps_account_for_the_energy_of_films_and_drives() {
         [[joint]]\nname = \"guide\"\nkind = \"prismatic\"\nchild = \"slider\"\naxis = [1, 0, 0]\nparent_point = \"200 0 0 mm\"\n\
         [[joint]]\nname = \"pin\"\nkind = \"revolute\"\nparent = \"rod\"\nchild = \"slider\"\naxis = [0, 1, 0]\nparent_point = \"150 0 0 mm\"\n\
         closes_loop = true\n\
-        [[film]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"50 mPa s\"\n";
+        [[lubricant]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"50 mPa s\"\n";
     let losses = ["radau5", "discrete-gradient"].map(|method| {
         let mut simulation = start_simulation(text, &[("solver.method", method), ("start", "ideal")]);
         run_until(&mut simulation, 0.1);
@@ -349,7 +349,7 @@ fn a_film_in_a_joint_without_play_changes_no_bit() {
     let joints = joints(0.0);
     for joint in [&joints[0], &replaced(&joints[1], "radial = \"0.1 mm\"", "radial = 0")] {
         let wet = replaced(&pair(joint, 0.0), "clearance = \"0.1 mm\"", "clearance = 0");
-        let dry = wet.split("[[film]]").next().unwrap().to_owned();
+        let dry = wet.split("[[lubricant]]").next().unwrap().to_owned();
         let ends = [wet, dry].map(|text| {
             let mut simulation = start_simulation(&text, &[("start", "ideal")]);
             let frame = frame_at(&mut simulation, 0.02);
@@ -393,7 +393,7 @@ fn changed_viscosity_and_changed_play_act_from_now_on() {
 #[test]
 fn a_lubricated_ball_is_not_in_free_flight() {
     let chain = jointplay_scene::built_in_text("chain").unwrap();
-    let film = "[[film]]\nname = \"oil\"\njoint = \"J3\"\nviscosity = \"20 mPa s\"\n";
+    let film = "[[lubricant]]\nname = \"oil\"\njoint = \"J3\"\nviscosity = \"20 mPa s\"\n";
     let mut simulation = start_simulation(&format!("{chain}\n{film}"), &[]);
     frame_at(&mut simulation, 0.05);
     let ledger = simulation.ledger().unwrap();
@@ -403,11 +403,11 @@ fn a_lubricated_ball_is_not_in_free_flight() {
 #[test]
 fn invalid_films_are_refused_with_their_position() {
     let cases = r#"
-        "50 mPa s" => "50 mPa" -> film.oil.viscosity | units of viscosity
-        "50 mPa s" => "-1 mPa s" -> film.oil.viscosity | allowed 0 Pa s to
-        joint = "S" => joint = "T" -> film.oil.joint | no such joint with play; allowed S
-        thickness = "1 nm" => thickness = "0 um" -> film.oil.thickness | allowed
-        thickness = "1 nm" => length = "10 mm" -> film.oil.length | has the size of that
+        "50 mPa s" => "50 mPa" -> lubricant.oil.viscosity | units of viscosity
+        "50 mPa s" => "-1 mPa s" -> lubricant.oil.viscosity | allowed 0 Pa s to
+        joint = "S" => joint = "T" -> lubricant.oil.joint | no such joint with play; allowed S
+        thickness = "1 nm" => thickness = "0 um" -> lubricant.oil.thickness | allowed
+        thickness = "1 nm" => length = "10 mm" -> lubricant.oil.length | has the size of that
     "#;
     assert_refused(cases, |change| {
         let (from, to) = change.split_once(" => ").expect(change);
@@ -420,10 +420,14 @@ fn invalid_films_are_refused_with_their_position() {
     assert!(
         doubts
             .iter()
-            .any(|doubt| doubt.contains("film oil: its thickness 60 um is above half of the play 100 um of joint S")),
+            .any(|doubt| doubt
+                .contains("lubricant oil: its thickness 60 um is above half of the play 100 um of joint S")),
         "{doubts:?}"
     );
     let planar = replaced(&journal(), ", length = \"24 mm\"", ", planar = true");
     let error = Scene::parse(&planar, Some("mine.toml"), &[]).unwrap_err().to_string();
-    assert!(error.contains("film.oil.length: missing; a pin that stays in its plane has a length only"), "{error}");
+    assert!(
+        error.contains("lubricant.oil.length: missing; a pin that stays in its plane has a length only"),
+        "{error}"
+    );
 }

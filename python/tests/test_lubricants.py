@@ -1,4 +1,4 @@
-"""Lubricants: a film whose viscosity changes while it carries a turning journal."""
+"""Lubricants: one whose viscosity changes while it carries a turning journal."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ child = "pin"
 axis = [1, 0, 0]
 play = { radial = "0.1 mm", length = "24 mm", radius = "10 mm" }
 start = { velocity = "100 rad/s" }
-[[film]]
+[[lubricant]]
 name = "oil"
 joint = "J"
 viscosity = "20 mPa s"
@@ -28,17 +28,17 @@ viscosity = "20 mPa s"
 
 def test_a_thinner_oil_carries_a_journal_farther_out():
     simulation = jp.Simulation(jp.Scene.from_toml(JOURNAL))
-    film = simulation.films["oil"]
+    oil = simulation.lubricants["oil"]
     ratios = []
     for viscosity in (0.02, 0.01, 0.005):
-        film.viscosity = viscosity
-        assert film.viscosity == viscosity
+        oil.viscosity = viscosity
+        assert oil.viscosity == viscosity
         simulation.step_until(simulation.time + 0.6)
         frame = simulation.frame()
         # It carries the whole weight, without contact.
-        assert np.allclose(frame.film_forces[0], [0.0, 0.0, 10.0], atol=1e-2), frame.film_forces
+        assert np.allclose(frame.lubricant_forces[0], [0.0, 0.0, 10.0], atol=1e-2), frame.lubricant_forces
         assert not frame.normal_forces.any()
-        assert np.isclose(np.linalg.norm(frame.film_forces[0]), np.linalg.norm([simulation[f"oil.force.{axis}"] for axis in "xyz"]))
+        assert np.isclose(np.linalg.norm(frame.lubricant_forces[0]), np.linalg.norm([simulation[f"oil.force.{axis}"] for axis in "xyz"]))
         ratios.append(np.linalg.norm(frame.eccentricities[0]) / 1e-4)
         # Sommerfeld, film of half a turn: the attitude angle falls with the eccentricity.
         _, y, z = frame.eccentricities[0]
@@ -47,11 +47,11 @@ def test_a_thinner_oil_carries_a_journal_farther_out():
     assert ratios[0] < ratios[1] < ratios[2] < 1.0
 
 
-def test_what_a_film_cannot_be_is_refused():
+def test_what_a_lubricant_cannot_be_is_refused():
     simulation = jp.Simulation(jp.Scene.from_toml(JOURNAL))
     with pytest.raises(jp.OptionError, match="viscosity of oil = -1; allowed 0"):
-        simulation.films["oil"].viscosity = -1.0
-    with pytest.raises(jp.OptionError, match="no film is called"):
-        simulation.films["water"]
-    assert simulation.set("film.oil.viscosity", "30 mPa s") == "now"
-    assert simulation.films["oil"].viscosity == 0.03
+        simulation.lubricants["oil"].viscosity = -1.0
+    with pytest.raises(jp.OptionError, match="no lubricant is called"):
+        simulation.lubricants["water"]
+    assert simulation.set("lubricant.oil.viscosity", "30 mPa s") == "now"
+    assert simulation.lubricants["oil"].viscosity == 0.03
