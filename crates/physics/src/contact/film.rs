@@ -9,12 +9,13 @@
 //! - P = C (S u_n + (D^2 u_n^2 + w^2 u_t^2)^1/2), where S and D are half the sum and half the difference of f(eps) and f(-eps),
 //! - Q = C g (1 + s D u_n / (D^2 u_n^2 + w^2 u_t^2)^1/2), where s = 1 - (1 - 0.4 eps) g(0) / g,
 //!
-//! which is exact for motion along n, where P = C f(eps) u_n closing and C f(-eps) u_n opening, and for motion across it, where P = C w |u_t|
-//! and Q = C g. Between both it interpolates, with s fitted: within 14 % of the film in that half, or of its force across. Coefficients:
+//! which is exact for motion along n, where P = C f(eps) u_n closing and C f(-eps) u_n opening, and for motion across it, where
+//! P = C w |u_t| and Q = C g. Between both it interpolates, with s fitted: within 14 % of the film in that half, or of its force across.
+//! Coefficients:
 //!
 //! - A pin in a bearing long against its radius (Pinkus & Sternlicht, Theory of Hydrodynamic Lubrication, 1961): C = mu L r^3 / c^3 and
-//!   f(x) = 6 (pi + 2 asin x) / m^3/2 + 12 x / m, with m = 1 - x^2; g = 12 pi / ((2 + eps^2) m^1/2) and w = 24 eps / ((2 + eps^2) m), those of
-//!   Sommerfeld with a film of half a turn. The formula printed there for any direction, which lubricated joints of multibody systems use
+//!   f(x) = 6 (pi + 2 asin x) / m^3/2 + 12 x / m, with m = 1 - x^2; g = 12 pi / ((2 + eps^2) m^1/2) and w = 24 eps / ((2 + eps^2) m),
+//!   those of Sommerfeld with a film of half a turn. The formula printed there for any direction, which lubricated joints of multibody systems use
 //!   since Flores, Ambrosio & Claro (2004, Multibody System Dynamics 12, 47), is within 9 % of this where the gap closes, but holds a pin
 //!   back that leaves the wall, at eps = 0.98 ten times as much as the film does.
 //! - A ball in a socket all around it: C = 6 pi mu r^4 / c^3 and f(x) = ln(1 - x) / x^3 + 1 / (x^2 (1 - x)) - 1 / (2 x) (Goenka 1980, as in
@@ -359,8 +360,8 @@ mod tests {
         })
     }
 
-    /// Force of the film in the half of a socket that closes, by finite volumes on `n` by `n` cells from the direction of motion outwards and
-    /// around it, over 6 pi.
+    /// Force of the film in the half of a socket that closes, by finite volumes on `n` by `n` cells from the direction of motion outwards
+    /// and around it, over 6 pi.
     fn half_of_a_socket(ratio: f64, angle: f64, n: usize) -> [f64; 2] {
         let (sin, cos) = libm::sincos(angle);
         let (down, around) = (0.5 * PI / n as f64, PI / n as f64);

@@ -31,7 +31,8 @@ impl Machine {
                 linked[a.max(b)] = a.min(b);
             }
         }
-        // Of each joint, and of each element twice, for its force and its torque, or of a film for its drag and its stations: the trees it acts on.
+        // Of each joint, and of each element twice, for its force and its torque, or of a lubricant for its drag and its stations: the
+        // trees it acts on.
         let of_joints = self.loose_joints.iter().map(|joint| [joint.carrier().body, joint.carried().body]);
         let points = self.elements.iter().map(|element| element.points(self));
         let of_elements = points.zip(&self.elements).flat_map(|(points, element)| {

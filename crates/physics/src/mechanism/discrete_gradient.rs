@@ -6,9 +6,10 @@
 //! ([`Coefficients::step_force`]), so that Newton's method needs three rows per contact in place of one per coordinate: F = f(u +
 //! h/2 W M^-1 sum S^T F, s + h/2 S M^-1 sum S^T F).
 //!
-//! The film of a joint is solved for like a contact, by rows of its own. Its force is that at the part theta of the step, from 1/2 where the
-//! film is soft to 1 where it is stiff: theta = 1 / (1 - exp(-z)) - 1 / z, with which a velocity that falls as exp(-z t / h) is exact (Liniger &
-//! Willoughby 1970, SIAM J. Numer. Anal. 7, 47). At the middle a stiff film would turn a velocity that does not fit it into an oscillation.
+//! The film of a joint is solved for like a contact, by rows of its own. Its force is that at the part theta of the step, from 1/2 where
+//! the film is soft to 1 where it is stiff: theta = 1 / (1 - exp(-z)) - 1 / z, with which a velocity that falls as exp(-z t / h) is exact
+//! (Liniger & Willoughby 1970, SIAM J. Numer. Anal. 7, 47). At the middle a stiff film would turn a velocity that does not fit it into an
+//! oscillation.
 //!
 //! No event is located. The eccentricity at the end is that of the guessed motion, plus h W times the change of V.
 
@@ -257,8 +258,8 @@ pub struct StepStart<'a> {
 }
 
 impl DiscreteGradient {
-    /// For a state of `dimension` components, of which `n` are velocities, and elements between these bodies, with so many rows of a film; `within` if
-    /// a force accelerates only the trees it acts on.
+    /// For a state of `dimension` components, of which `n` are velocities, and elements between these bodies, with so many rows of a film;
+    /// `within` if a force accelerates only the trees it acts on.
     ///
     /// # Errors
     /// The contacts are coupled too widely.
@@ -397,7 +398,9 @@ impl DiscreteGradient {
         let films = elements.iter().enumerate().filter_map(|(i, element)| Some((i, element.film()?)));
         for (i, film) in films {
             let (drag, stations) = self.stations[self.first_station[i]..].split_first_mut().expect("a row of drag");
-            drag[0] = film.spin(motion);
+            if !at_end {
+                drag[0] = film.spin(motion);
+            }
             for (own, station) in stations.iter_mut().zip(film.stations(motion)) {
                 match at_end {
                     true => own[2] = station.eccentricity,
