@@ -198,24 +198,25 @@ damping = "1000 N s/m"
 
 def test_an_interrupted_study_resumes(tmp_path):
     study = jp.Study(jp.Scene.load("four-bar"), ["contact.clearance"], "A.normal:max", duration="5 ms")
-    values, record = np.linspace(1e-4, 2e-4, 7)[:, None], tmp_path / "record"
+    # So many that a busy computer does not finish them before it stops.
+    values, record = np.linspace(1e-4, 2e-4, 200)[:, None], tmp_path / "record"
     expected = study.run(values)
     seen = []
 
     def stop(part):
         seen.append(part)
-        if part > 0.5:
+        if part > 0.01:
             raise ArithmeticError
 
     with pytest.raises(ArithmeticError):
         study.run(values, threads=1, progress=stop, record=record)
     kept = record.read_text().splitlines()
-    assert 3 <= len(kept) - 1 < 7
+    assert 3 <= len(kept) - 1 < len(values)
     # A line that was being written.
     record.write_text("\n".join(kept) + "\n123.4 ")
     seen.clear()
     assert study.run(values, threads=1, progress=seen.append, record=record).tobytes() == expected.tobytes()
-    assert seen[0] == 0.0 and seen[1] >= (len(kept) - 1) / 7 and seen[-1] == 1.0
+    assert seen[0] == 0.0 and seen[1] >= (len(kept) - 1) / len(values) and seen[-1] == 1.0
     assert study.run(values, record=record).tobytes() == expected.tobytes()
     with pytest.raises(jp.OptionError, match=r"record was started with other settings \(vary\)"):
         study.run(values + 1e-5, record=record)
