@@ -46,7 +46,7 @@ pub enum ActiveSet<'a> {
     Immediate(&'a [ContactState]),
     /// No contact carries a force.
     Nothing,
-    /// No contact carries a force, nor does the pressure of a film: they are solved for.
+    /// No contact carries a force, nor does a film: they are solved for.
     Solved,
 }
 
