@@ -5,30 +5,9 @@ import pytest
 
 import jointplay as jp
 
-JOURNAL = """
-name = "journal"
-gravity = { x = 0, y = 0, z = "-10 m/s^2" }
-[[body]]
-name = "pin"
-mass = "1 kg"
-inertia = "10 10 10 kg m^2"
-[[joint]]
-name = "J"
-kind = "revolute"
-child = "pin"
-axis = [1, 0, 0]
-play = { radial = "0.1 mm", length = "24 mm", radius = "10 mm" }
-start = { velocity = "100 rad/s" }
-[[lubricant]]
-name = "oil"
-joint = "J"
-viscosity = "20 mPa s"
-"""
-
-
 def test_a_thinner_oil_carries_a_journal_farther_out():
-    simulation = jp.Simulation(jp.Scene.from_toml(JOURNAL))
-    oil = simulation.lubricants["oil"]
+    simulation = jp.Simulation(jp.Scene.load("oiled"))
+    oil = simulation.lubricants["thin"]
     ratios = []
     for viscosity in (0.02, 0.01, 0.005):
         oil.viscosity = viscosity
@@ -37,8 +16,8 @@ def test_a_thinner_oil_carries_a_journal_farther_out():
         frame = simulation.frame()
         # It carries the whole weight, without contact.
         assert np.allclose(frame.lubricant_forces[0], [0.0, 0.0, 10.0], atol=1e-2), frame.lubricant_forces
-        assert not frame.normal_forces.any()
-        assert np.isclose(np.linalg.norm(frame.lubricant_forces[0]), np.linalg.norm([simulation[f"oil.force.{axis}"] for axis in "xyz"]))
+        assert not frame.normal_forces[0].any()
+        assert np.isclose(np.linalg.norm(frame.lubricant_forces[0]), np.linalg.norm([simulation[f"thin.force.{axis}"] for axis in "xyz"]))
         ratios.append(np.linalg.norm(frame.eccentricities[0]) / 1e-4)
         # Sommerfeld, film of half a turn: the attitude angle falls with the eccentricity.
         _, y, z = frame.eccentricities[0]
@@ -48,10 +27,10 @@ def test_a_thinner_oil_carries_a_journal_farther_out():
 
 
 def test_what_a_lubricant_cannot_be_is_refused():
-    simulation = jp.Simulation(jp.Scene.from_toml(JOURNAL))
-    with pytest.raises(jp.OptionError, match="viscosity of oil = -1; allowed 0"):
-        simulation.lubricants["oil"].viscosity = -1.0
+    simulation = jp.Simulation(jp.Scene.load("oiled"))
+    with pytest.raises(jp.OptionError, match="viscosity of thin = -1; allowed 0"):
+        simulation.lubricants["thin"].viscosity = -1.0
     with pytest.raises(jp.OptionError, match="no lubricant is called"):
         simulation.lubricants["water"]
-    assert simulation.set("lubricant.oil.viscosity", "30 mPa s") == "now"
-    assert simulation.lubricants["oil"].viscosity == 0.03
+    assert simulation.set("lubricant.thin.viscosity", "30 mPa s") == "now"
+    assert simulation.lubricants["thin"].viscosity == 0.03

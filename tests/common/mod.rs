@@ -104,6 +104,49 @@ pub fn free_ball(place: f64, speed: f64, gravity: f64, contact: &str) -> String 
     )
 }
 
+/// The text of a scene without gravity: two free bodies that tumble, `far` metres from the origin, with `joint` S between them, as from
+/// [`pair_joints`]; `settings` begins the file, `more` ends it.
+pub fn pair(settings: &str, joint: &str, far: f64, more: &str) -> String {
+    format!(
+        r#"
+        gravity = {{ x = 0, y = 0, z = "0 m/s^2" }}
+        {settings}
+        [[body]]
+        name = "a"
+        mass = "0.2 kg"
+        inertia = "2e-5 4e-5 3e-5 kg m^2"
+        [[joint]]
+        name = "a"
+        kind = "free"
+        child = "a"
+        start = {{ position = "{far} 0 0 m", velocity = "0.3 0 0.1 m/s", angular_velocity = "30 -20 40 rad/s" }}
+        [[body]]
+        name = "b"
+        mass = "0.1 kg"
+        inertia = "2e-5 3e-5 4e-5 kg m^2"
+        {joint}
+        {more}
+        "#
+    )
+}
+
+/// Joints S of [`pair`]: a ball, and pins of which the pin or the bearing has the ends.
+pub fn pair_joints(far: f64) -> [String; 3] {
+    let ball = format!(
+        "[[joint]]\nname = \"b\"\nkind = \"free\"\nchild = \"b\"\n\
+         start = {{ position = \"{far} 0 0 m\", angular_velocity = \"-10 50 20 rad/s\" }}\n\
+         [[ball_joint]]\nname = \"S\"\nsocket = {{ body = \"a\", at = \"20 0 0 mm\" }}\nball = {{ body = \"b\", at = \"20 0 0 mm\" }}"
+    );
+    let pin = |ends: &str| {
+        format!(
+            "[[joint]]\nname = \"S\"\nkind = \"cylindrical\"\nparent = \"a\"\nchild = \"b\"\naxis = [0, 0.6, 0.8]\n\
+             parent_point = \"20 0 0 mm\"\nstart = {{ angular_velocity = \"80 rad/s\", velocity = \"0.2 m/s\" }}\n\
+             play = {{ radial = \"0.1 mm\", length = \"24 mm\", radius = \"10 mm\", ends = \"{ends}\" }}"
+        )
+    };
+    [ball, pin("pin"), pin("bearing")]
+}
+
 /// A simulation of a built-in scene.
 pub fn simulation(name: &str, changes: &Changes) -> Simulation {
     Simulation::new(&scene(name, changes).machine).unwrap()

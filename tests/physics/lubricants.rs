@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use crate::common::matrix::{every_variant, in_tree};
-use crate::common::{METHODS, assert_refused, frame_now, free_ball, parse, replaced, run_until};
+use crate::common::{METHODS, assert_refused, frame_now, free_ball, pair, pair_joints, parse, replaced, run_until};
 use crate::elements::frame_at;
 use crate::joint_elements::{momenta, start_simulation};
 use jointplay_physics::machine::Vec3;
@@ -145,59 +145,15 @@ fn a_pin_that_stays_in_its_plane_moves_as_one_that_does_not_tilt() {
     assert!((ends[0] - ends[1]).norm() < 1e-12 && ends[0].norm() > 1e-6, "{ends:?}");
 }
 
-/// Two free bodies with joint S between them, tumbling without gravity.
-fn pair(joint: &str, far: f64) -> String {
-    format!(
-        r#"
-        [gravity]
-        z = 0
-        [contact]
-        clearance = "0.1 mm"
-        restitution = 0.8
-        normal_law = "gonthier"
-        friction = 0.1
-        [[body]]
-        name = "a"
-        mass = "0.2 kg"
-        inertia = "4e-5 5e-5 6e-5 kg m^2"
-        [[joint]]
-        name = "a"
-        kind = "free"
-        child = "a"
-        start = {{ position = "{far} 0 0 m", velocity = "0.3 0 0.1 m/s", angular_velocity = "30 -20 40 rad/s" }}
-        [[body]]
-        name = "b"
-        mass = "0.1 kg"
-        inertia = "2e-5 3e-5 4e-5 kg m^2"
-        {joint}
-        [[lubricant]]
-        name = "oil"
-        joint = "S"
-        viscosity = "20 mPa s"
-        "#
-    )
-}
-
-/// The joints of [`pair`]: a ball, and pins in two ways.
-fn joints(far: f64) -> [String; 3] {
-    let ball = format!(
-        "[[joint]]\nname = \"b\"\nkind = \"free\"\nchild = \"b\"\n\
-         start = {{ position = \"{far} 0 0 m\", angular_velocity = \"-10 50 20 rad/s\" }}\n\
-         [[ball_joint]]\nname = \"S\"\nsocket = {{ body = \"a\", at = \"20 0 0 mm\" }}\nball = {{ body = \"b\", at = \"20 0 0 mm\" }}"
-    );
-    let pin = |ends: &str| {
-        format!(
-            "[[joint]]\nname = \"S\"\nkind = \"cylindrical\"\nparent = \"a\"\nchild = \"b\"\naxis = [0, 0.6, 0.8]\n\
-             parent_point = \"20 0 0 mm\"\nstart = {{ angular_velocity = \"80 rad/s\", velocity = \"0.2 m/s\" }}\n\
-             play = {{ radial = \"0.1 mm\", length = \"24 mm\", radius = \"10 mm\", ends = \"{ends}\" }}"
-        )
-    };
-    [ball, pin("bearing"), pin("pin")]
+/// Two tumbling bodies with joint S between them, and oil in it.
+fn oiled_pair(joint: &str, far: f64) -> String {
+    let contact = "[contact]\nclearance = \"0.1 mm\"\nrestitution = 0.8\nnormal_law = \"gonthier\"\nfriction = 0.1\n";
+    pair(contact, joint, far, "[[lubricant]]\nname = \"oil\"\njoint = \"S\"\nviscosity = \"20 mPa s\"")
 }
 
 #[test]
 fn momentum_is_kept_and_energy_balanced_and_methods_agree() {
-    for (kind, joint) in joints(0.0).iter().enumerate() {
+    for (kind, joint) in pair_joints(0.0).iter().enumerate() {
         let mut ends: Vec<Vec3> = Vec::new();
         for variant in every_variant() {
             let [method, formulation] = variant.changes();
@@ -208,7 +164,7 @@ fn momentum_is_kept_and_energy_balanced_and_methods_agree() {
                 ("solver.step", "1 us"),
                 ("solver.steps_per_impact", "128"),
             ];
-            let mut simulation = start_simulation(&pair(joint, 0.0), &changes);
+            let mut simulation = start_simulation(&oiled_pair(joint, 0.0), &changes);
             let machine = simulation.machine().clone();
             let before = momenta(&frame_now(&mut simulation), &machine);
             let frame = frame_at(&mut simulation, 0.03);
@@ -238,7 +194,8 @@ fn momentum_is_kept_and_energy_balanced_and_methods_agree() {
 fn a_film_far_from_the_origin_acts_as_one_at_it() {
     for index in 0..3 {
         let ends = [0.0, 1000.0].map(|far| {
-            let mut simulation = start_simulation(&pair(&joints(far)[index], far), &[("solver.tolerance", "1e-8")]);
+            let mut simulation =
+                start_simulation(&oiled_pair(&pair_joints(far)[index], far), &[("solver.tolerance", "1e-8")]);
             let frame = frame_at(&mut simulation, 0.01);
             (frame.bodies[1].position - frame.bodies[0].position, frame.elements[0].force)
         });
@@ -346,9 +303,9 @@ fn discrete_gradient_steps_account_for_the_energy_of_films_and_drives() {
 
 #[test]
 fn a_film_in_a_joint_without_play_changes_no_bit() {
-    let joints = joints(0.0);
+    let joints = pair_joints(0.0);
     for joint in [&joints[0], &replaced(&joints[1], "radial = \"0.1 mm\"", "radial = 0")] {
-        let wet = replaced(&pair(joint, 0.0), "clearance = \"0.1 mm\"", "clearance = 0");
+        let wet = replaced(&oiled_pair(joint, 0.0), "clearance = \"0.1 mm\"", "clearance = 0");
         let dry = wet.split("[[lubricant]]").next().unwrap().to_owned();
         let ends = [wet, dry].map(|text| {
             let mut simulation = start_simulation(&text, &[("start", "ideal")]);
