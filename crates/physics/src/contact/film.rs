@@ -15,9 +15,9 @@
 //!
 //! - A pin in a bearing long against its radius (Pinkus & Sternlicht, Theory of Hydrodynamic Lubrication, 1961): C = mu L r^3 / c^3 and
 //!   f(x) = 6 (pi + 2 asin x) / m^3/2 + 12 x / m, with m = 1 - x^2; g = 12 pi / ((2 + eps^2) m^1/2) and w = 24 eps / ((2 + eps^2) m),
-//!   those of Sommerfeld with a film of half a turn. Their formula for any direction, which lubricated joints of multibody systems use since
-//!   Flores, Ambrosio & Claro (2004, Multibody System Dynamics 12, 47), is within 9 % of this where the gap closes, but holds a pin back
-//!   that leaves the wall, at eps = 0.98 ten times as much as the film does.
+//!   those of Sommerfeld with a film of half a turn. Their formula for any direction, which lubricated joints of multibody systems use
+//!   since Flores, Ambrosio & Claro (2004, Multibody System Dynamics 12, 47), is within 9 % of this where the gap closes, but holds a pin
+//!   back that leaves the wall, at eps = 0.98 ten times as much as the film does.
 //! - A ball in a socket all around it: C = 6 pi mu r^4 / c^3 and f(x) = ln(1 - x) / x^3 + 1 / (x^2 (1 - x)) - 1 / (2 x) (Goenka 1980, as in
 //!   Flores & Lankarani 2010, Nonlinear Dynamics 60, 99). Across n the pressure is
 //!   12 mu r^2 |u_t| / c^3 (2 - eps cos theta) sin theta cos phi / ((4 + eps^2) (1 - eps cos theta)^2), from which g and w follow.
