@@ -230,7 +230,7 @@ def test_threads_give_the_same_bits_as_one():
 
 def test_stepping_lets_other_threads_run():
     simulation = jp.Simulation(jp.Scene.load("four-bar"))
-    thread = threading.Thread(target=simulation.step, args=(20_000,))
+    thread = threading.Thread(target=simulation.step, args=(100_000,))
     thread.start()
     turns = 0
     while thread.is_alive():
@@ -242,7 +242,7 @@ def test_stepping_lets_other_threads_run():
 
 def test_a_simulation_in_use_is_refused_to_another_thread():
     simulation = jp.Simulation(jp.Scene.load("four-bar"))
-    thread = threading.Thread(target=simulation.step, args=(20_000,))
+    thread = threading.Thread(target=simulation.step, args=(100_000,))
     thread.start()
     assert issubclass(jp.InUseError, RuntimeError)
     with pytest.raises(jp.InUseError, match="in use in another thread; give each thread its own"):

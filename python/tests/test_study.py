@@ -199,7 +199,7 @@ damping = "1000 N s/m"
 def test_an_interrupted_study_resumes(tmp_path):
     study = jp.Study(jp.Scene.load("four-bar"), ["contact.clearance"], "A.normal:max", duration="5 ms")
     # So many that a busy computer does not finish them before it stops.
-    values, record = np.linspace(1e-4, 2e-4, 200)[:, None], tmp_path / "record"
+    values, record = np.linspace(1e-4, 2e-4, 1000)[:, None], tmp_path / "record"
     expected = study.run(values)
     seen = []
 

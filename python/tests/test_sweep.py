@@ -84,21 +84,23 @@ def test_a_table_has_one_point_per_row():
 
 
 def test_an_interrupted_sweep_resumes_from_its_record(tmp_path):
-    sweep = jp.Sweep(jp.Scene.load("four-bar"), {"contact.friction": [0.1, 0.2, 0.3, 0.4]}, duration="20 ms")
-    record = tmp_path / "sweep.record"
+    # So many points that a busy computer does not finish them before it stops.
+    points, record = {"contact.friction": np.linspace(0.1, 0.4, 2000)}, tmp_path / "sweep.record"
+    sweep = jp.Sweep(jp.Scene.load("four-bar"), points, duration="5 ms")
 
     def stop(part):
-        if part > 0.3:
+        if part > 0.01:
             raise RuntimeError("stopped")
 
     with pytest.raises(RuntimeError, match="stopped"):
         sweep.run(1, stop, record=record)
-    assert 1 < len(record.read_text().splitlines()) < 5
+    kept = len(record.read_text().splitlines()) - 1
+    assert 1 <= kept < 2000
     parts = []
     result = sweep.run(1, parts.append, record=record)
-    assert parts[0] > 0.2 and result["A_peak_N"].tobytes() == sweep.run()["A_peak_N"].tobytes()
-    other = jp.Sweep(jp.Scene.load("four-bar"), {"contact.friction": [0.1, 0.2, 0.3, 0.4]}, duration="10 ms")
-    with pytest.raises(jp.OptionError, match=r"other settings \(duration_s: 0.02 there, 0.01 now\)"):
+    assert parts[0] >= kept / 2000 and result["A_peak_N"].tobytes() == sweep.run()["A_peak_N"].tobytes()
+    other = jp.Sweep(jp.Scene.load("four-bar"), points, duration="10 ms")
+    with pytest.raises(jp.OptionError, match=r"other settings \(duration_s: 0.005 there, 0.01 now\)"):
         other.run(record=record)
     with pytest.raises(OSError, match="not a regular file"):
         sweep.run(record=tmp_path)
