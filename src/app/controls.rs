@@ -568,7 +568,12 @@ impl Controls {
 /// Label of the parameter.
 fn label(ui: &mut Ui, player: &Player, row: &Row) {
     let name = RichText::new(row.parameter.label);
-    let label = ui.label(if FIRST.contains(&row.key) { name.strong() } else { name });
+    let has_effect = equations::without_effect(row.key, player.pending()).is_none();
+    let label = ui.label(match FIRST.contains(&row.key) {
+        _ if !has_effect => name.weak(),
+        true => name.strong(),
+        false => name,
+    });
     tooltip(ui, &label, player, row);
 }
 
@@ -624,6 +629,9 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
         let equation = shown_law.and_then(|shown_law| shown_law.elsewhere).unwrap_or(parameter.equation);
         if !equation.is_empty() {
             ui.label(RichText::new(equation).small());
+        }
+        if let Some(reason) = equations::without_effect(key, player.pending()) {
+            ui.label(RichText::new(format!("Without effect: {reason}")).small());
         }
         let mut range = value::typeset(&parameter.range());
         if parameter.key == "contact.clearance"

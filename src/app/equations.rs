@@ -1,7 +1,7 @@
 //! Place of a parameter in the equations, for its tooltip: name of the law, formula, and the paper's equation number or, for a
 //! law not used in the paper, its publication. The formulas are those of the laws themselves (`contact`).
 
-use crate::contact::{ElasticLaw, FrictionLaw, Parameters, ShownLaw};
+use crate::contact::{ElasticLaw, FrictionLaw, NormalLaw, Parameters, ShownLaw};
 use crate::scene::Scene;
 
 /// The law of `scene` that uses the parameter `key`; `None` unless it is a contact parameter that the laws in force use. Without friction
@@ -32,11 +32,44 @@ fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
     })
 }
 
+/// What leaves the contact parameter `key` without effect: no joint with play that takes its value has a law that uses it.
+pub fn without_effect(key: &str, scene: &Scene) -> Option<&'static str> {
+    let (group, last) = key.rsplit_once('.')?;
+    let name = group.strip_prefix("joint.");
+    if name.is_none() && group != "contact" {
+        return None;
+    }
+    let joints = scene.machine.loose_joints.iter().filter(|joint| name.is_none_or(|name| joint.name == name));
+    let mut reasons = joints.map(|joint| unused_by(last, &joint.contact));
+    let first = reasons.next()??;
+    reasons.all(|reason| reason.is_some()).then_some(first)
+}
+
+/// What leaves the last part of a key without effect under the laws of `contact`.
+fn unused_by(last: &str, contact: &Parameters) -> Option<&'static str> {
+    let law = contact.friction_law;
+    let bristle = ["static_friction_ratio", "stribeck_speed", "bristle_stiffness", "bristle_damping"];
+    let of_sliding = ["friction_velocity", "slip_speed_low", "slip_speed_high"];
+    let is_frictionless = law == FrictionLaw::ModifiedCoulomb && contact.friction == 0.0;
+    let of_damping = ["restitution", "impact_speed_floor"];
+    let reasons = [
+        (law == FrictionLaw::None, &["friction", "friction_velocity"][..], "the friction law is none"),
+        (law != FrictionLaw::ModifiedCoulomb, &of_sliding[1..], "only the friction law modified-coulomb uses it"),
+        (law != FrictionLaw::Bristle, &bristle, "only the friction law bristle uses it"),
+        (is_frictionless, &of_sliding, "the friction coefficient is 0"),
+        (contact.static_friction_ratio == 1.0, &["stribeck_speed"], "the static friction ratio is 1"),
+        (contact.normal_law == NormalLaw::Hertz, &of_damping, "the normal law hertz loses no energy"),
+        (contact.wear_coefficient == 0.0, &["wear_shape"], "the wear coefficient is 0"),
+    ];
+    reasons.into_iter().find(|(holds, keys, _)| *holds && keys.contains(&last)).map(|(_, _, reason)| reason)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{Elasticity, NormalLaw};
+    use crate::contact::Elasticity;
     use crate::scene::{Quantity, evaluate};
+    use crate::simulate::Simulation;
     use crate::units::Dimension;
 
     #[test]
@@ -66,6 +99,63 @@ mod tests {
             let other = if user == bristle { coulomb } else { bristle };
             assert_eq!(own(key, other), None, "{key}");
             assert_eq!(own(key, none).map(|shown| shown.formula), Some("F = 0"), "{key}");
+        }
+    }
+
+    #[test]
+    fn a_parameter_without_effect_changes_no_bit_of_the_motion() {
+        let [law, ratio] = ["contact.friction_law", "contact.static_friction_ratio"];
+        let settings = [
+            &[(law, "modified-coulomb")][..],
+            &[(law, "modified-coulomb"), ("contact.friction", "0")],
+            &[(law, "bristle")],
+            &[(law, "bristle"), (ratio, "1.5")],
+            &[(law, "none")],
+            &[("contact.normal_law", "hertz")],
+        ];
+        let end = |changes: &[(&str, &str)]| {
+            let changes: Vec<_> = changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+            let scene = Scene::load("pendulum", &changes).expect("built in");
+            let mut simulation = Simulation::new(&scene.machine).expect("starts");
+            simulation.advance_to(0.05).expect("runs");
+            let bits: Vec<u64> = simulation.state_vector().iter().map(|x| x.to_bits()).collect();
+            (bits, scene)
+        };
+        for set in settings {
+            let (before, scene) = end(set);
+            for (key, value) in [
+                ("contact.friction", "0.3"),
+                ("contact.friction_velocity", "centres"),
+                ("contact.slip_speed_low", "0.03 mm/s"),
+                ("contact.slip_speed_high", "30 mm/s"),
+                ("contact.static_friction_ratio", "2"),
+                ("contact.stribeck_speed", "20 mm/s"),
+                ("contact.bristle_stiffness", "2000 N/mm"),
+                ("contact.bristle_damping", "100 N s/m"),
+                ("contact.restitution", "0.5"),
+                ("contact.impact_speed_floor", "500 mm/s"),
+            ] {
+                let is_unused = without_effect(key, &scene).is_some();
+                assert_eq!(end(&[set, &[(key, value)]].concat()).0 == before, is_unused, "{key} under {set:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_that_one_joint_uses_has_an_effect() {
+        let changes = [("joint.S2.friction_law".to_owned(), "bristle".to_owned())];
+        let scene = Scene::load("spcmm", &changes).expect("built in");
+        for (key, is_unused) in [
+            ("contact.bristle_stiffness", false),
+            ("joint.S1.bristle_stiffness", true),
+            ("joint.S2.bristle_stiffness", false),
+            ("contact.slip_speed_low", false),
+            ("joint.S2.slip_speed_low", true),
+            ("contact.wear_shape", true),
+            ("contact.clearance", false),
+            ("spcmm.frequency", false),
+        ] {
+            assert_eq!(without_effect(key, &scene).is_some(), is_unused, "{key}");
         }
     }
 

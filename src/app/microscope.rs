@@ -41,6 +41,8 @@ const MIN_HEIGHT_WITH_FRICTION: f32 = 180.0;
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 430.0;
 /// Least side of a phone's picture with the choice of the plane in sight below it, points.
 const MIN_SIDE_ABOVE_CHOICE: f32 = 160.0;
+/// Least side of the picture for which the diagram of friction is in sight below it, points.
+const MIN_SIDE_ABOVE_FRICTION: f32 = 140.0;
 /// Width of the numbers beside the pictures, points.
 const NUMBERS_WIDTH: f32 = 215.0;
 /// Least reference speed of the velocity arrow, m/s.
@@ -168,7 +170,7 @@ impl Microscope {
                 let state = ui.text_style_height(&TextStyle::Body) + gap;
                 let section_height = if magnified.has_section() { MIN_SECTION_HEIGHT + gap } else { 0.0 };
                 let below = section_height + state + friction::MIN_HEIGHT + 2.0 * gap;
-                let reserves = has_friction && below <= MAX_FRACTION * space.y;
+                let reserves = has_friction && space.y - below >= MIN_SIDE_ABOVE_FRICTION;
                 let side = if is_narrow {
                     // The choice below is shown whole or is scrolled to: a strip of it would look like a mistake.
                     let choice = ui.spacing().interact_size.y + gap;

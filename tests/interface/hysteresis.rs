@@ -221,6 +221,16 @@ fn it_lies_within_the_panel_also_enlarged_and_in_a_presentation() {
         let picture = harness.get_by_label_contains("Slide J under the microscope. ").rect();
         assert!(!picture.intersects(sheet), "{size:?}");
     }
+    // On a common screen it is in sight with the plots below, under the circle and the section of a ball.
+    let changes = [("contact.friction_law", "bristle")];
+    let clock = crate::common::ticking_clock::<10>;
+    let mut harness = opened("spcmm", &changes, [1280.0, 800.0], egui::Theme::Light, clock);
+    harness.key_press(Key::L);
+    harness.run();
+    run_to(&mut harness, 0.1);
+    let sheet = harness.get_by_label_contains("Friction over sliding: ").rect();
+    let timeline = harness.get_by_label_contains("Timeline").rect();
+    assert!(sheet.bottom() < timeline.top(), "{sheet} {timeline}");
     let mut harness = pushed([1920.0, 1080.0], egui::Theme::Light, &[]);
     run_to(&mut harness, 0.1);
     harness.key_press(Key::F5);
@@ -229,12 +239,27 @@ fn it_lies_within_the_panel_also_enlarged_and_in_a_presentation() {
     assert!(drawn(&harness).is_some());
 }
 
+/// Whether the tooltip of the slider `name` says `words`.
+fn says(harness: &mut Harness<'_, App>, name: &str, words: &str) -> bool {
+    harness.get_by_role_and_label(Role::Slider, name).scroll_to_me();
+    harness.run();
+    let slider = harness.get_by_role_and_label(Role::Slider, name).rect();
+    harness.hover_at(slider.center());
+    harness.run_steps(60);
+    let is_said = harness.query_by_label(words).is_some();
+    harness.hover_at(egui::pos2(800.0, 300.0));
+    harness.run_steps(30);
+    is_said
+}
+
 #[test]
 fn a_change_to_bristles_waits_for_a_restart_and_says_so() {
     let mut harness = opened("pendulum", &[], WIDE, egui::Theme::Light, crate::common::ticking_clock::<10>);
     run_to(&mut harness, 0.02);
     click(&mut harness, "Contact");
     harness.run();
+    let unused = "Without effect: only the friction law bristle uses it";
+    assert!(says(&mut harness, "Stribeck speed", unused));
     harness.get_by_role_and_label(Role::ComboBox, "Friction law").scroll_to_me();
     harness.run();
     harness.get_by_role_and_label(Role::ComboBox, "Friction law").click();
@@ -243,6 +268,9 @@ fn a_change_to_bristles_waits_for_a_restart_and_says_so() {
     harness.run();
     assert!(harness.state().player().is_pending("contact.friction_law"));
     harness.get_by_label("Friction law: Applies when the run starts again from t = 0.");
+    assert!(!says(&mut harness, "Stribeck speed", unused));
+    assert!(says(&mut harness, "Stribeck speed", "Without effect: the static friction ratio is 1"));
+    assert!(says(&mut harness, "Low slip speed", "Without effect: only the friction law modified-coulomb uses it"));
     run_to(&mut harness, 0.05);
     click(&mut harness, "Restart");
     harness.run();
