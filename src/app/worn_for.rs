@@ -35,8 +35,8 @@ const MAX_AGES: usize = 200;
 const HALVINGS: usize = 24;
 
 const HELP: &str = "How wide the clearances are after this time of operation, if they go on growing as in the last full period of the run: \
-     the rate measured there times the time. The run starts again with them when the slider is let go. Wear usually changes the rate; short \
-     times, one after the other, follow it.";
+     the rate measured there times the time; until a new run has had its period, as in the run before. The run starts again with them when \
+     the slider is let go. Wear usually changes the rate; short times, one after the other, follow it.";
 
 /// A play that wears.
 struct Play {
@@ -100,6 +100,14 @@ impl Age {
 
     fn hours(&self) -> f64 {
         self.jumps.last().map_or(0.0, |(hours, _)| *hours)
+    }
+
+    /// Growth in the last jump, m/s: the rate of the run before.
+    fn latest_rates(&self) -> Option<Vec<f64>> {
+        let [.., (from, before), (to, after)] = self.jumps.as_slice() else {
+            return None;
+        };
+        Some(before.iter().zip(after).map(|(before, after)| (after - before) / ((to - from) * SECONDS)).collect())
     }
 
     /// Clearances after `hours`: on the way here, or beyond by `rates`, m/s.
@@ -180,6 +188,8 @@ impl WornFor {
         let rates = player.wear_rates().map(|all| -> Vec<f64> {
             plays.iter().map(|play| all.get(play.joint).map_or(0.0, |rates| rates[play.place])).collect()
         });
+        // Until the worn machine has run for a period, it goes on as the run before.
+        let rates = rates.or_else(|| age.latest_rates());
         let rates = rates.filter(|rates| rates.iter().any(|rate| *rate > 0.0));
         let is_let_go = ui.push_id(NAME, |ui| self.slider(ui, player, (&plays, &age, rates.as_deref()))).inner;
         ui.add_space(4.0);
@@ -250,12 +260,14 @@ impl WornFor {
     fn words(&self, ui: &mut Ui, player: &Player, (plays, age, rates): (&[Play], &Age, Option<&[f64]>), hours: f64) {
         let period = if player.is_driven() { "period" } else { "second" };
         let limit = self.draft.as_ref().and_then(|draft| draft.limit.as_ref()).filter(|(most, _)| hours >= *most);
+        let is_measured = player.wear_rates().is_some();
         let heading = match (limit, &self.draft, rates) {
             (Some((_, joint)), ..) => format!("No longer: {joint} is as wide as the scene allows"),
-            (None, Some(_), _) => format!("Extrapolated from the last {period}:"),
+            (None, Some(_), _) if is_measured => format!("Extrapolated from the last {period}:"),
+            (None, Some(_), _) => "Extrapolated from the run before:".to_owned(),
             (None, None, _) if hours > 0.0 => "Extrapolated from the run before:".to_owned(),
             (None, None, Some(_)) => "From the clearances as set:".to_owned(),
-            (None, None, None) if player.wear_rates().is_some() => format!("Nothing wore in the last {period}"),
+            (None, None, None) if is_measured => format!("Nothing wore in the last {period}"),
             (None, None, None) => format!("Let the run go on for a full {period}"),
         };
         let mut line = |text: String| ui.add(egui::Label::new(RichText::new(text).small().weak()).truncate());

@@ -1,10 +1,7 @@
 //! The slider "Worn for".
 
 use eframe::egui::{self, Key, Modifiers, accesskit::Role, vec2};
-use egui_kittest::{
-    Harness,
-    kittest::{NodeT as _, Queryable as _},
-};
+use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::App;
 use jointplay::simulate::{Frame, Simulation};
 
@@ -103,8 +100,19 @@ fn a_later_age_goes_on_from_the_worn_run_and_an_earlier_one_back_on_the_way() {
     set_hours(&mut harness, 4000.0);
     let worn = clearances(&harness);
     assert!((hours_of(&set, &worn, &first) - 4000.0).abs() < 0.01);
-    // Nothing is known of its wear yet.
-    assert!(harness.get_by_role_and_label(Role::Slider, NAME).accesskit_node().is_disabled());
+    // Nothing is known of its wear yet: until then it goes on, and back, at the rate of the run before.
+    set_hours(&mut harness, 5000.0);
+    assert!((hours_of(&set, &clearances(&harness), &first) - 5000.0).abs() < 0.01);
+    let track = harness.get_by_role_and_label(Role::Slider, NAME).rect();
+    harness.drag_at(track.left_center() + vec2(40.0, 0.0));
+    harness.hover_at(track.left_center() + vec2(60.0, 0.0));
+    harness.run_steps(3);
+    assert!(shows_text(&harness, "Extrapolated from the run before:"));
+    harness.key_press(Key::Escape);
+    harness.drop_at(track.left_center() + vec2(60.0, 0.0));
+    harness.run_steps(3);
+    set_hours(&mut harness, 4000.0);
+    assert_eq!(clearances(&harness), worn);
     harness.state_mut().run_to(2.1 * PERIOD);
     harness.run_steps(3);
     let second = rates(&harness);
