@@ -190,7 +190,7 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
         check_refused(same, 2, &["--from-state s: "]);
     }
     for (text, words) in [
-        (good.replace("\"state_format\":11", "\"state_format\":12"), "format 11"),
+        (good.replace("\"state_format\":12", "\"state_format\":13"), "format 12"),
         ("{}".to_owned(), "not a state"),
         ("[1, 2]".to_owned(), "not a state"),
         ("\u{0}\u{1b}[31m".to_owned(), "not a state"),

@@ -100,6 +100,48 @@ fn above_the_yield_speed_the_restitution_falls_with_the_fourth_root_of_the_speed
 }
 
 #[test]
+fn a_yielding_impact_is_stepped_as_one_of_its_restitution() {
+    let asked = format!("{:e}", 0.99 * 1e-3_f64.powf(0.25));
+    for method in METHODS {
+        let first = |restitution: &str, yield_speed: &str| {
+            let changes = [
+                ("contact.normal_law", "gonthier"),
+                ("contact.impact_speed_floor", "0.01 mm/s"),
+                ("solver.method", method),
+                ("contact.restitution", restitution),
+                ("contact.yield_speed", yield_speed),
+            ];
+            impacts(&mut axial_impact(&changes), 0.02)[0]
+        };
+        let (yielding, set) = (first("0.99", "0.1 mm/s"), first(&asked, "0 m/s"));
+        assert_eq!(yielding.steps, set.steps, "{method}");
+        assert!((yielding.achieved() - set.achieved()).abs() < 1e-9, "{method}: {yielding:?} {set:?}");
+    }
+}
+
+#[test]
+fn slow_impacts_after_a_yielding_one_leave_no_doubt_of_its_damping() {
+    let changes = [
+        ("contact.normal_law", "gonthier"),
+        ("contact.restitution", "0.99"),
+        ("contact.yield_speed", "10 mm/s"),
+        ("contact.impact_speed_floor", "0.1 mm/s"),
+    ];
+    let mut simulation = simulation("ball", &changes);
+    let mut in_an_impact = false;
+    while simulation.time() < 6.0 {
+        simulation.step().unwrap();
+        in_an_impact |= simulation.contact_states(0).iter().any(|state| state.active);
+        if in_an_impact {
+            let doubts = simulation.doubts();
+            assert!(!doubts.iter().any(|doubt| matches!(doubt, Doubt::Damping { .. })), "{doubts:?}");
+        }
+    }
+    assert!(simulation.statistics().impacts() > 64);
+    assert!(simulation.statistics().joints[0].damping > 1.0);
+}
+
+#[test]
 fn a_yield_speed_above_all_impacts_changes_no_bit_and_needs_something_that_can_fall() {
     for method in METHODS {
         let [without, with] = ["0 m/s", "1 m/s"].map(|speed| {

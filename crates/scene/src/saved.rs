@@ -6,7 +6,7 @@ use serde::Deserialize as _;
 use serde_json::{Map, Value as Json, json};
 
 /// Version of the layout.
-const FORMAT: u64 = 11;
+const FORMAT: u64 = 12;
 
 /// A state of a run, with the scene to which it belongs.
 #[derive(Clone, Debug)]

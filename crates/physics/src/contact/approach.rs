@@ -21,19 +21,24 @@ pub enum ApproachBranch {
 }
 
 impl Coefficients {
-    /// Approach speed without a contact state, m/s: `rate`, but not below the floor, and lower where the parts yield.
+    /// Approach speed in the damping term without a contact state, m/s: `rate`, but not below the floor.
     #[inline]
     pub(crate) fn with_floor(&self, rate: f64) -> f64 {
-        let speed = rate.max(self.speed_floor);
+        self.yielded(rate.max(self.speed_floor))
+    }
+
+    /// Speed in the damping term for the approach speed `speed`, m/s: lower where the parts yield.
+    #[inline]
+    pub(crate) fn yielded(&self, speed: f64) -> f64 {
         if speed > self.yield_speed { self.yielding(speed) } else { speed }
     }
 
-    /// Approach speed, m/s, for a stored value `stored` (m/s) and the penetration rate `rate` (m/s).
+    /// Speed in the damping term, m/s, for a stored value `stored` (m/s) and the penetration rate `rate` (m/s).
     #[inline]
     pub(super) fn approach(&self, branch: ApproachBranch, stored: f64, rate: f64) -> f64 {
         match branch {
             ApproachBranch::Unfrozen if self.uses_largest_rate => stored.max(rate),
-            ApproachBranch::Unfrozen | ApproachBranch::Held => stored,
+            ApproachBranch::Unfrozen | ApproachBranch::Held => self.yielded(stored),
             ApproachBranch::Rising => self.with_floor(rate),
         }
     }

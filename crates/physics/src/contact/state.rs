@@ -9,8 +9,7 @@ use super::{ApproachBranch, Coefficients, FrictionBranch};
 pub struct ContactState {
     /// Whether ball and socket are in contact.
     pub active: bool,
-    /// Approach speed in the damping term, m/s: delta_dot0 of this contact, or its largest rate so far, not below the scene's
-    /// floor; 0 while free.
+    /// Approach speed, m/s: delta_dot0 of this contact, or its largest rate so far, not below the scene's floor; 0 while free.
     pub approach_speed: f64,
     /// Whether the floor applied: this contact then rebounds higher than requested.
     pub below_speed_floor: bool,
@@ -48,7 +47,7 @@ impl ContactState {
     pub(crate) fn at_onset(c: &Coefficients, rate: f64) -> Self {
         Self {
             active: true,
-            approach_speed: c.with_floor(rate),
+            approach_speed: rate.max(c.speed_floor),
             below_speed_floor: rate < c.speed_floor,
             ..Self::default()
         }
@@ -88,7 +87,7 @@ impl ContactState {
         }
     }
 
-    /// Approach speed in the damping term, m/s, at the penetration rate `rate`; while the joint is free, the rate itself.
+    /// Speed in the damping term, m/s, at the penetration rate `rate`; while the joint is free, the rate itself.
     #[inline]
     pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
         if self.active { c.approach(self.approach_branch, self.approach_speed, rate) } else { c.with_floor(rate) }

@@ -338,7 +338,11 @@ impl DiscreteGradient {
                 clearances: start.clearances,
                 slip: start.slip,
                 bent: Vec3::zeros(),
-                approach: if contact_state.active { contact_state.approach_speed } else { law.with_floor(start.rate) },
+                approach: if contact_state.active {
+                    law.yielded(contact_state.approach_speed)
+                } else {
+                    law.with_floor(start.rate)
+                },
                 rebound: from.rebounds[j],
             };
             let mean = (end - start.eccentricity) / from.h;

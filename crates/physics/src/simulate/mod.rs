@@ -114,10 +114,28 @@ pub struct JointStatistics {
     pub last_separation: Option<f64>,
     /// Largest ratio of damping to elastic force in any contact.
     pub damping: f64,
-    /// When it occurred, s.
-    pub damping_time: f64,
+    /// Where that ratio most exceeded the one of an undisturbed impact.
+    pub overdamped: Overdamped,
     /// Largest displacement along the axis of a pin with a travel, m.
     pub axial: f64,
+}
+
+/// Ratio of damping to elastic force at an instant of a contact.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Overdamped {
+    /// s.
+    pub time: f64,
+    /// The ratio.
+    pub ratio: f64,
+    /// Its largest value in an undisturbed impact at the approach speed of the contact.
+    pub usual: f64,
+}
+
+impl Overdamped {
+    /// How far the ratio is above the usual one.
+    pub(crate) fn excess(&self) -> f64 {
+        self.ratio - self.usual
+    }
 }
 
 impl Statistics {

@@ -6,6 +6,7 @@ use crate::contact::{ContactState, Separation};
 use crate::integrate::StepControl;
 use crate::machine::MIN_IMPACT_STEPS;
 use crate::mechanism::{ContactId, Contacts};
+use crate::simulate::Overdamped;
 use crate::simulate::impacts::{ImpactEvents, Onset};
 use crate::simulate::peaks::PenetrationCubic;
 
@@ -66,9 +67,13 @@ impl State {
         let (j, law) = (contacts.joint_of(c), contacts.coefficients(c));
         let (damping, theta) = cubic.most_damped(law, contact_state, from);
         self.record.impacts.update(c, &law.elastic, cubic, damping);
-        if damping > self.record.statistics.joints[j].damping {
-            self.record.statistics.joints[j].damping = damping;
-            self.record.statistics.joints[j].damping_time = start + theta * (self.now.t - start);
+        let statistics = &mut self.record.statistics.joints[j];
+        statistics.damping = statistics.damping.max(damping);
+        let time = start + theta * (self.now.t - start);
+        let usual = law.damping_at(contact_state.approach_speed);
+        let now = Overdamped { time, ratio: damping, usual };
+        if now.excess() > statistics.overdamped.excess() {
+            statistics.overdamped = now;
         }
     }
 }

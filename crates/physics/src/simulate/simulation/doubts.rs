@@ -4,7 +4,7 @@ use super::{Model, State};
 use crate::contact::{Coefficients, ElasticLaw, FrictionVelocity};
 use crate::integrate::Method;
 use crate::machine::{LooseJoint, LooseKind, MIN_IMPACT_STEPS, Machine, Pin, Slide};
-use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm, WornWall};
+use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm, Overdamped, WornWall};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
 const MAX_BELOW_SPEED_FLOOR: f64 = 0.5;
@@ -105,18 +105,10 @@ impl DoubtContext<'_> {
         let depth = |j: usize| self.state.worn(j).into_iter().fold(deepest(j), f64::max);
         let worn = self.worst(MAX_WORN, |j| depth(j) / size(j));
         doubts.extend(worn.map(|(joints, j)| Doubt::Worn { joints, depth: depth(j), size: size(j) }));
-        // Where parts yield, that of the fastest of the latest impacts.
-        let fastest = |j: usize| {
-            let own = self.state.impacts().filter(|impact| impact.joint == j);
-            own.map(|impact| impact.approach_speed).fold(0.0, f64::max)
-        };
-        let usual = |j: usize| self.coefficients(j).damping_at(fastest(j));
-        let damping = self.worst(MAX_DAMPING, |j| statistics.joints[j].damping - usual(j));
-        doubts.extend(damping.map(|(joints, j)| Doubt::Damping {
-            joints,
-            time: statistics.joints[j].damping_time,
-            ratio: statistics.joints[j].damping,
-            usual: usual(j),
+        let damping = self.worst(MAX_DAMPING, |j| statistics.joints[j].overdamped.excess());
+        doubts.extend(damping.map(|(joints, j)| {
+            let Overdamped { time, ratio, usual } = statistics.joints[j].overdamped;
+            Doubt::Damping { joints, time, ratio, usual }
         }));
         doubts.extend(self.state.record.starts_inside.map(|(i, [depth, usual], force)| {
             let element = &self.machine.elements[i];
