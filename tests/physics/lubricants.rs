@@ -321,7 +321,7 @@ fn a_film_in_a_joint_without_play_changes_no_bit() {
 }
 
 #[test]
-fn changed_viscosity_and_changed_play_act_from_now_on() {
+fn changed_viscosity_radius_and_play_act_from_now_on() {
     let text = "[[parameter]]\nname = \"mu\"\nvalue = \"50 mPa s\"\n".to_owned()
         + &replaced(&sinking(), "viscosity = \"50 mPa s\"", "viscosity = \"mu\"");
     for method in METHODS {
@@ -331,6 +331,17 @@ fn changed_viscosity_and_changed_play_act_from_now_on() {
         assert_eq!(simulation.set("parameter.mu", "100 mPa s"), Ok(Effect::Now), "{method}");
         let after = frame_now(&mut simulation);
         assert!((after.elements[0].force.z / before.elements[0].force.z - 2.0).abs() < 1e-9, "{method}");
+        // The force goes with the fourth power of the radius.
+        for (key, value, factor) in [
+            ("contact.ball_radius", "20 mm", 16.0),
+            ("parameter.mu", "50 mPa s", 8.0),
+            ("contact.ball_radius", "10 mm", 0.5),
+            ("parameter.mu", "100 mPa s", 1.0),
+        ] {
+            assert_eq!(simulation.set(key, value), Ok(Effect::Now), "{method}");
+            let now = frame_now(&mut simulation).elements[0].force.z / after.elements[0].force.z;
+            assert!((now / factor - 1.0).abs() < 1e-9, "{method} {key} = {value}: {now}");
+        }
         // Twice the play: C falls to an eighth, and the ball is half as eccentric.
         assert_eq!(simulation.set("contact.clearance", "0.2 mm"), Ok(Effect::Now), "{method}");
         let wider = frame_now(&mut simulation);

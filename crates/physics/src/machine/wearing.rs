@@ -50,7 +50,7 @@ impl LooseKind {
 
 impl Pin {
     /// Length L, m, of a pin with these contact parameters, if it has one: one that stays in its plane only where its elastic law needs it.
-    fn length_by(&self, contact: &Parameters) -> Option<f64> {
+    pub(crate) fn length_by(&self, contact: &Parameters) -> Option<f64> {
         self.length.or(match contact.elasticity {
             Elasticity::Line { length } | Elasticity::StiffnessAt { length, .. } => Some(length),
             Elasticity::Sphere | Elasticity::Stiffness(_) => None,

@@ -72,7 +72,7 @@ use std::sync::Arc;
 use crate::contact::{ContactState, FrictionBranch};
 use crate::machine::{Formulation, LiveElements, Machine, MachineFault, Mat3, StartRule, Vec3};
 use crate::units::format_quantity_digits;
-use elements::{FilmPlace, ForceElement, element_of, elements_of};
+use elements::{Film, ForceElement, element_of, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
 use forest::Forest;
 use lagrange::Lagrange;
@@ -349,8 +349,8 @@ pub struct Mechanism {
     live: LiveElements,
     /// Number of the scene's elements.
     scene_elements: usize,
-    /// Those that are films in joints with play, by joint.
-    films: Vec<FilmPlace>,
+    /// Places of those that are films in joints with play.
+    films: Vec<usize>,
     pull: Option<Pull>,
     turns: Turns,
     /// World gravity, m/s^2.
@@ -423,15 +423,21 @@ impl Mechanism {
             Formulation::Lagrange => Box::new(Lagrange::new(machine, &model)),
         };
         let path = |site| equations.path(&model, site);
+        let elements = elements_of(machine, &model);
         let mut mechanism = Self {
             paths: model.sites.iter().map(path).collect(),
             evaluation_time: bounds::evaluation_time(machine, &model),
             sources: power::Sources::new(&model, &*equations, machine.elements.len()),
-            elements: elements_of(machine, &model),
+            films: elements
+                .iter()
+                .enumerate()
+                .filter(|(_, e)| e.film().is_some_and(|f| f.len() > 0))
+                .map(|(i, _)| i)
+                .collect(),
+            elements,
             element_laws: machine.elements.iter().map(drives::law_of).collect(),
             live: LiveElements::default(),
             scene_elements: machine.elements.len(),
-            films: FilmPlace::all(machine),
             pull: None,
             turns: Turns::new(machine, &model),
             latest: Latest::Unknown,
@@ -828,28 +834,27 @@ impl Mechanism {
         }
     }
 
-    /// Films in joints with play.
-    pub(crate) fn films(&self) -> &[FilmPlace] {
-        &self.films
+    /// Films in joints with play, with their places among the scene's elements.
+    pub(crate) fn films(&self) -> impl Iterator<Item = (usize, &Film)> {
+        self.films.iter().filter_map(|i| Some((*i, self.elements[*i].film()?)))
     }
 
     /// Bound of the rate at which films damp the motion last measured, 1/s; 0 without films.
     pub(crate) fn fastest_film(&self) -> f64 {
         let motion = self.motion();
-        let rate = |film: &FilmPlace| {
-            let film = self.elements[film.element].film()?;
+        let rate = |(_, film): (usize, &Film)| {
             let rates = film.stations(motion).map(|station| {
                 let points = film.points(&station, motion);
                 film.damping(&station).norm() * discrete_gradient::max_mobility(&self.model, &points)[0]
             });
-            Some(rates.sum::<f64>())
+            rates.sum()
         };
-        self.films.iter().filter_map(rate).fold(0.0, f64::max)
+        self.films().map(rate).fold(0.0, f64::max)
     }
 
     /// Whether a film is in loose joint `j`, which has play.
     pub(crate) fn has_film(&self, j: usize) -> bool {
-        self.films.binary_search_by_key(&j, |film| film.joint).is_ok()
+        self.films().any(|(_, film)| film.joint == j)
     }
 
     /// The hand's pull, if any.
@@ -896,11 +901,6 @@ impl Mechanism {
             let element = self.live.element(machine, i);
             let next = element_of(machine, &self.model, &element);
             self.element_laws[i] = drives::law_of(&element);
-            if let Some(film) = FilmPlace::of(machine, i, &element)
-                && let Some(own) = self.films.iter_mut().find(|own| own.element == i)
-            {
-                *own = film;
-            }
             let motion = self.equations.motion();
             other_ends |= next.ends(motion).is_some() != self.elements[i].ends(motion).is_some();
             self.elements[i] = next;

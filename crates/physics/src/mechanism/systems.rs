@@ -59,7 +59,7 @@ impl Evaluator<'_> {
         let mut loads = Loads { wrench, counts: &mut self.counts, has_left_branch: &mut *self.has_left_branch };
         contacts.load(&at, &mut loads);
         for film in &**films {
-            elements[film.element].set_clearance(contacts.clearance_at(film.joint, t));
+            elements[*film].follow(contacts, t);
         }
         for element in elements {
             element.load(&at, &mut loads);

@@ -44,8 +44,8 @@ pub(super) fn fill(
     out.elastic = mechanism.elastic_energy(time) + mechanism.bristle_energy(y);
     out.elements.clear();
     out.elements.extend(mechanism.element_reports(time));
-    for film in mechanism.films() {
-        out.joints[film.joint].lubricant_force += out.elements[film.element].force;
+    for (i, film) in mechanism.films() {
+        out.joints[film.joint].lubricant_force += out.elements[i].force;
     }
     let (kinetic, gravitational) = mechanism.energies();
     out.kinetic = kinetic;

@@ -3,16 +3,20 @@
 //! A pin that tilts has two stations with half of the film each, at the nodes of Gauss's rule over its length.
 
 use super::{ActiveSet, At, Coupling, ElementReport, ForceElement, Loads, TorqueDerivatives, push};
-use crate::contact::{Film as Law, FilmShape};
-use crate::machine::{self, LooseKind, Machine, Mat3, Vec3};
-use crate::mechanism::Powers;
+use crate::contact::{Film as Law, FilmShape, Parameters};
+use crate::machine::{self, LooseKind, Machine, Mat3, Pin, Vec3};
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::loose::Wall;
 use crate::mechanism::model::{Anchor, Model};
+use crate::mechanism::{Contacts, Powers};
 
 pub struct Film {
-    /// The law of each station.
+    /// Index of its loose joint.
+    pub joint: usize,
+    /// The law of each station, with the parameters in force.
     pub law: Law,
+    /// The joint's pin, if it has one, and a length of the film other than that, m.
+    pin: (Option<Pin>, Option<f64>),
     /// Centres on the body with the wall and on the other; none in a joint without play.
     stations: Vec<[Anchor; 2]>,
     /// Axis of the wall, in the axes of its body, unless it is a sphere.
@@ -35,11 +39,11 @@ pub struct Station {
 impl Film {
     pub fn new(film: &machine::Lubricant, machine: &Machine, model: &Model) -> Self {
         let joint = &machine.loose_joints[film.joint];
-        let radius = joint.contact.ball_radius;
-        let length = match joint.kind {
-            LooseKind::Pin(_) => film.length.or(joint.pin_length()),
+        let pin = match joint.kind {
+            LooseKind::Pin(pin) => Some(pin),
             LooseKind::Ball | LooseKind::Slide(_) => None,
         };
+        let length = film.length.or(joint.pin_length());
         let mut sites = model.sites.iter().filter(|site| site.joint == film.joint && site.play == 0);
         let (first, second) = (sites.next(), sites.next());
         let stations = match (first, second) {
@@ -52,22 +56,34 @@ impl Film {
             (Some(only), None) => vec![[only.carrier, only.carried]],
             _ => Vec::new(),
         };
-        let share = 1.0 / stations.len().max(1) as f64;
-        Self {
+        let mut new = Self {
+            joint: film.joint,
             law: Law {
-                shape: length.map_or(FilmShape::Ball, |length| FilmShape::Pin(length * share)),
+                shape: FilmShape::Ball,
                 viscosity: film.viscosity,
                 thickness: film.thickness,
-                radius,
-                clearance: joint.contact.clearance,
+                radius: 0.0,
+                clearance: 0.0,
             },
+            pin: (pin, film.length),
             stations,
             axis: first.and_then(|site| match site.wall {
                 Wall::Bore(axis, _) => Some(axis),
                 Wall::Socket | Wall::Plane(_) => None,
             }),
             is_reversed: first.is_some_and(|site| site.is_reversed),
-        }
+        };
+        new.set(&joint.contact, joint.contact.clearance);
+        new
+    }
+
+    /// Takes the parameters of its joint, and the clearance, m.
+    fn set(&mut self, joint: &Parameters, clearance: f64) {
+        let (pin, own) = self.pin;
+        let length = pin.and_then(|pin| own.or(pin.length_by(joint)));
+        let share = 1.0 / self.stations.len().max(1) as f64;
+        self.law.shape = length.map_or(FilmShape::Ball, |length| FilmShape::Pin(length * share));
+        (self.law.radius, self.law.clearance) = (joint.ball_radius, clearance);
     }
 
     fn state(&self, [wall, edge]: &[Anchor; 2], motion: &[Kinematics]) -> Station {
@@ -177,8 +193,8 @@ impl ForceElement for Film {
         Some(self)
     }
 
-    fn set_clearance(&mut self, clearance: f64) {
-        self.law.clearance = clearance;
+    fn follow(&mut self, contacts: &Contacts, t: f64) {
+        self.set(contacts.parameters(self.joint), contacts.clearance_at(self.joint, t));
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {

@@ -19,6 +19,7 @@ pub use contact::Gap;
 
 use serde::{Deserialize, Serialize};
 
+use super::Contacts;
 use super::drives::law_of;
 use super::kinematics::{Kinematics, Wrench};
 use super::loose::Spot;
@@ -324,8 +325,8 @@ pub(super) trait ForceElement: Send + Sync {
         None
     }
 
-    /// Sets the clearance of the joint in which it is, m, if it is in one.
-    fn set_clearance(&mut self, _clearance: f64) {}
+    /// Takes the present parameters and clearance of the joint in which it is, if it depends on them.
+    fn follow(&mut self, _contacts: &Contacts, _t: f64) {}
 
     /// Its report at `t`; empty for a joint with play, which is reported as a joint.
     fn report(&self, _t: f64, _motion: &[Kinematics]) -> ElementReport {
@@ -336,39 +337,6 @@ pub(super) trait ForceElement: Send + Sync {
 /// The force elements of `machine`, in the order of the scene.
 pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn ForceElement>> {
     machine.elements.iter().map(|element| element_of(machine, model, element)).collect()
-}
-
-/// A film in a joint that has play now.
-#[derive(Clone, Copy, Debug)]
-pub struct FilmPlace {
-    /// Index of the element.
-    pub(crate) element: usize,
-    /// Index of the loose joint.
-    pub joint: usize,
-    /// Least thickness, m.
-    pub thickness: f64,
-}
-
-impl FilmPlace {
-    /// All of `machine`, by joint.
-    pub(super) fn all(machine: &Machine) -> Vec<Self> {
-        let elements = machine.elements.iter().enumerate();
-        let mut films: Vec<Self> = elements.filter_map(|(i, element)| Self::of(machine, i, element)).collect();
-        films.sort_by_key(|film| film.joint);
-        films
-    }
-
-    /// That of element `index`, if it is one.
-    pub(super) fn of(machine: &Machine, index: usize, element: &Element) -> Option<Self> {
-        match element.kind {
-            ElementKind::Lubricant(machine::Lubricant { joint, thickness, .. })
-                if machine.loose_joints[joint].contact.clearance > 0.0 =>
-            {
-                Some(Self { element: index, joint, thickness })
-            }
-            _ => None,
-        }
-    }
 }
 
 /// The force element for `element`, of `machine` or in place of one of its own.

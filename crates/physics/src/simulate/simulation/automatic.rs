@@ -173,7 +173,7 @@ impl Stepping<'_> {
         }
         let touches = state.now.contact_states.iter().any(|m| m.active);
         let limited = selector.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
-        let is_damped = touches || !self.mechanism.films().is_empty();
+        let is_damped = touches || self.mechanism.films().next().is_some();
         let settled = limited || (is_damped && selector.since_contact >= SETTLED_STEPS);
         if settled && velocities <= self.mechanism.largest_implicit() {
             (selector.since_contact, selector.limited) = (0, 0);

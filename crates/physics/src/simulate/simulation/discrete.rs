@@ -143,11 +143,11 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
             }
         }
     }
-    for film in mechanism.films() {
+    for (_, film) in mechanism.films() {
         for c in mechanism.contacts.of_play(film.joint, 0) {
             let gap = state.now.gaps[c];
             if gap.rate > 0.0 {
-                h = h.min(SQUEEZED / finer(state) * (film.thickness - gap.penetration.min(0.0)) / gap.rate);
+                h = h.min(SQUEEZED / finer(state) * (film.law.thickness - gap.penetration.min(0.0)) / gap.rate);
             }
         }
     }
