@@ -335,8 +335,8 @@ def run_scene(
     warn: bool = True,
     worn: Walls | None = None,
     walls_from: float = 0.0,
-) -> tuple[Run, float, Walls]:
-    """As `Scene.run`; also the end of the first step from `walls_from` on, s, and the worn walls then."""
+) -> tuple[Run, Walls]:
+    """As `Scene.run`; also the worn walls at `walls_from`, s, where a step ends."""
     names = [channels] if isinstance(channels, str) else list(channels)
     results = _native.run(scene.native, duration, every, names, progress, read_walls(worn), walls_from)
     run = Run(scene, results)
@@ -345,7 +345,7 @@ def run_scene(
             warnings.warn(f"{scene.name}: {doubt}", DoubtWarning, stacklevel=3)
     if results["fault"] is not None:
         raise Stopped(results["fault"], time=run.end, advice=results["advice"], run=run)
-    return run, results["walls_time"], results["worn_walls_before"]
+    return run, results["worn_walls_before"]
 
 
 def _unpickle(origin: Any) -> Scene:

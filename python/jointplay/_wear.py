@@ -135,7 +135,7 @@ def wearing_plays(scene: Scene) -> list[Play]:
                 Play(key, joint, f"{joint}.{channel}") for key, channel in own if key in keys and value_of(scene, key) > 0.0
             ]
     if any(scene[f"joint.{joint}.wear_shape"] == "profile" for joint in scene.ball_joints):
-        walls = run_scene(scene, 0.0, channels=["time"], warn=False)[2]
+        walls = run_scene(scene, 0.0, channels=["time"], warn=False)[1]
         by_direction = {joint: tuple(len(wall) for wall in own) for joint, own in walls.items()}
         plays = [
             play._replace(walls=by_direction.get(play.joint, ())) if play.channel == f"{play.joint}.worn" else play
@@ -241,14 +241,12 @@ class WearingScene:
         periods = self.settle + self.observe
         every = self.period / self.rows
         scene, walls = self.at(depths).set(slowed), self.walls(depths)
-        begin = self.settle * self.period
-        run, since, before = run_scene(
-            scene, periods * self.period, every, channels, warn=False, worn=walls, walls_from=begin
-        )
+        begin = self.settle * self.period if walls else 0.0
+        run, before = run_scene(scene, periods * self.period, every, channels, warn=False, worn=walls, walls_from=begin)
         self.runs += 1
-        first, observed = self.settle * self.rows, self.observe * self.period
+        first = self.settle * self.rows
         growth = [
-            (np.concatenate(run.worn_walls[play.joint]) - np.concatenate(before[play.joint])) * observed / (run.end - since)
+            np.concatenate(run.worn_walls[play.joint]) - np.concatenate(before[play.joint])
             if play.walls
             else np.array([run[play.channel][-1] - run[play.channel][first]])
             for play in self.plays
@@ -281,7 +279,8 @@ def wear(
 
     A run of `settle` periods, which are a transient, and `observe` more says how much each play grows in a cycle, at clearances that stay
     as they are. This growth is extrapolated over `jump` cycles, once in one jump and once in two halves, each with its own run. The two
-    are combined to second order; their difference, over the growth, is in `difference`. Without a `jump` it is chosen so that the difference
+    are combined to second order, but for walls that wear by direction, where the halves alone count; their difference, over the growth, is in
+    `difference`. Without a `jump` it is chosen so that the difference
     stays below `tolerance`; a given one is kept.
 
     Each run starts from the start of the scene, whose clearances are wider by what has worn off, or its walls deeper where they wear by

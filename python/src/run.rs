@@ -34,9 +34,9 @@ struct Recorder {
     /// Rows so far.
     rows: usize,
     impacts: Vec<Impact>,
-    /// What has worn off by direction at the first step from this time on, s.
+    /// What has worn off by direction until this time, s, at which a step ends.
     walls_from: f64,
-    walls: Option<(f64, report::Walls)>,
+    walls: Option<report::Walls>,
 }
 
 impl Recorder {
@@ -54,11 +54,12 @@ impl Recorder {
             if self.live.time() >= self.duration {
                 return Ok(true);
             }
-            let stepped = self.live.step_until(self.duration);
+            let end = if self.walls.is_none() { self.walls_from.min(self.duration) } else { self.duration };
+            let stepped = self.live.step_until(end);
             stepped.map_err(|stopped| (stopped.to_string(), Some(stopped.advice.to_string())))?;
             self.impacts.extend(self.live.take_impacts());
             if self.walls.is_none() && self.live.time() >= self.walls_from {
-                self.walls = Some((self.live.time(), report::walls(&self.live)));
+                self.walls = Some(report::walls(&self.live));
             }
         }
         Ok(false)
@@ -108,7 +109,7 @@ pub fn run<'py>(
     }
     let readings = channels.iter().map(|channel| (channel.name.clone(), channel.reading())).collect();
     let reader = RowReader::new(times, 0, readings);
-    let walls = (walls_from <= 0.0).then(|| (0.0, report::walls(&live)));
+    let walls = (walls_from <= 0.0).then(|| report::walls(&live));
     let impacts = Vec::new();
     let mut run = Recorder { live, duration, reader, channels, values, capacity, rows: 0, impacts, walls_from, walls };
     let fault = loop {
@@ -186,9 +187,7 @@ fn results_dict<'py>(py: Python<'py>, run: Recorder, fault: Option<Fault>) -> Py
     all.set_item("ledger", report::ledger(py, live)?)?;
     all.set_item("statistics", report::statistics(py, live)?)?;
     all.set_item("worn_walls", report::wall_arrays(py, &report::walls(live))?)?;
-    let (time, walls) = run.walls.unwrap_or_default();
-    all.set_item("walls_time", time)?;
-    all.set_item("worn_walls_before", report::wall_arrays(py, &walls)?)?;
+    all.set_item("worn_walls_before", report::wall_arrays(py, &run.walls.unwrap_or_default())?)?;
     all.set_item("impacts", report::impacts(py, live, &run.impacts)?)?;
     let (fault, advice) = fault.unzip();
     all.set_item("fault", fault)?;

@@ -138,6 +138,13 @@ def test_walls_wear_by_direction_and_jumps_follow_a_direct_run():
     assert worn["J.eccentricity.z"][-1] < -1e-4 - 0.9 * np.max(found.worn_walls["J"])
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_nothing_wears_in_a_period_of_one_long_step_without_a_touch():
+    changes = {"contact.wear_shape": "profile", "contact.wear_coefficient": "1e-9 m^2/N"}
+    found = jp.wear(jp.Scene.load("ball").set(changes), 10, period="1 ms")
+    assert all(np.all(depth == 0.0) for depth in found.depth.values()) and np.all(found.difference == 0.0)
+
+
 def test_walls_that_the_scene_does_not_have_are_refused():
     scene = jp.Scene.from_toml(PIN).set({"contact.wear_shape": "profile"})
     wall = np.zeros(72)
