@@ -543,7 +543,7 @@ impl Player {
         for (key, value) in values {
             match value {
                 Some(value) => scene = scene.with(key, value)?,
-                None => drop(scene.parameter(key)?),
+                None => drop(scene.undo_change(key)?),
             }
         }
         let event = |(key, value): &(String, Option<String>)| match value {

@@ -55,6 +55,23 @@ impl State {
         contact_state
     }
 
+    /// Ends contact `c`, of joint `j`, at `time`, s, with the penetration rate `rate`, m/s.
+    pub(super) fn end(&mut self, (c, j): (ContactId, usize), time: f64, rate: f64) {
+        let steps = std::mem::replace(&mut self.contacts[c].steps, 0);
+        let coarse = self.conditions.solver.method.control() == StepControl::Fixed && steps < MIN_IMPACT_STEPS;
+        let statistics = &mut self.record.statistics.joints[j];
+        statistics.coarse += u64::from(coarse);
+        statistics.below_speed_floor += u64::from(self.now.contact_states[c].below_speed_floor);
+        statistics.last_separation = Some(self.now.t);
+        if let Some(impact) = self.record.impacts.end(c, time, rate) {
+            let farthest = statistics.excessive_rebound.map_or(0.0, |impact| impact.restitution_excess());
+            if impact.restitution_excess() > farthest {
+                statistics.excessive_rebound = Some(*impact);
+            }
+        }
+        self.now.contact_states[c] = ContactState::default();
+    }
+
     /// Records a step of contact `c` that began at `start` (s), from fraction `from` on.
     fn record_contact_step(
         &mut self,
@@ -125,7 +142,6 @@ impl Stepping<'_> {
         let located = self.attempt.located_contact.take();
         let (fixed, rounding) = (!self.locates(), self.rounding());
         let Self { mechanism, state, before, attempt, .. } = self;
-        let counts_steps = state.conditions.solver.method.control() == StepControl::Fixed;
         let mut changes = ContactChanges { contacts: false, forces: false };
         // What is as close to its wall as the located ball, which is there but for the error of the step, switches in the same
         // instant.
@@ -159,8 +175,8 @@ impl Stepping<'_> {
             }
             changes.contacts = true;
             changes.forces |= fixed;
-            let steps = std::mem::replace(&mut state.contacts[c].steps, 0);
             if in_contact {
+                state.contacts[c].steps = 0;
                 let cubic = PenetrationCubic::new(start, end, h, rounding);
                 let crosses = start.penetration <= 0.0 && end.penetration > 0.0;
                 let theta = if crosses { cubic.crossing() } else { 1.0 };
@@ -191,19 +207,7 @@ impl Stepping<'_> {
                 } else {
                     (state.now.t, end.rate)
                 };
-                let statistics = &mut state.record.statistics;
-                statistics.joints[j].below_speed_floor += u64::from(state.now.contact_states[c].below_speed_floor);
-                if let Some(impact) = state.record.impacts.end(c, time, rate) {
-                    let farthest =
-                        statistics.joints[j].excessive_rebound.map_or(0.0, |impact| impact.restitution_excess());
-                    if impact.restitution_excess() > farthest {
-                        statistics.joints[j].excessive_rebound = Some(*impact);
-                    }
-                }
-                let coarse = counts_steps && steps < MIN_IMPACT_STEPS;
-                state.record.statistics.joints[j].coarse += u64::from(coarse);
-                state.now.contact_states[c] = ContactState::default();
-                state.record.statistics.joints[j].last_separation = Some(state.now.t);
+                state.end((c, j), time, rate);
             }
         }
         changes

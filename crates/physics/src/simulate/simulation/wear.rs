@@ -7,11 +7,10 @@
 
 use super::energy::energies;
 use super::{Attempt, Stepping, store_gaps};
-use crate::contact::ContactState;
 use crate::integrate::System as _;
 use crate::machine::Vec3;
 use crate::mechanism::{ActiveSet, ContactId, Mechanism, Profile, Worn};
-use crate::simulate::{StopAdvice, StopFault, Stopped, Wear};
+use crate::simulate::{StopAdvice, StopFault, Stopped, Wear, WornWall};
 
 /// Wear of the plays of a joint over a step.
 #[derive(Clone, Copy, Debug, Default)]
@@ -135,7 +134,7 @@ impl Stepping<'_> {
         let located = self.locates();
         let Self { mechanism, state, attempt, .. } = self;
         let t = state.now.t;
-        let (mut moved, mut through) = (false, None);
+        let (mut moved, mut thinnest) = (false, None);
         for (c, rubs) in attempt.abrasion.iter().enumerate() {
             if rubs.iter().all(|rub| rub.depth == 0.0) {
                 continue;
@@ -147,9 +146,9 @@ impl Stepping<'_> {
                 for Rub { depth, toward, penetration } in rubs.iter().filter(|rub| rub.depth > 0.0) {
                     profile.bumps().deposit(depths, *depth, [clearance, *penetration], toward);
                 }
-                let deepest = depths.iter().copied().fold(0.0, f64::max);
-                if deepest > mechanism.contacts.coefficients(c).ball_radius {
-                    through = Some((c, deepest));
+                // Bumps are higher than their sum: few walls need to be asked.
+                if depths.iter().any(|depth| *depth > mechanism.contacts.coefficients(c).ball_radius) {
+                    thinnest = Some(c);
                 }
                 mechanism.contacts.continue_profile(c, t, depths);
             }
@@ -181,25 +180,31 @@ impl Stepping<'_> {
             mechanism.complete_gaps(active_set, &now.y);
         }
         store_gaps(mechanism, &mut now.gaps);
-        for (c, gap) in now.gaps.iter().enumerate() {
-            let contact_state = &mut now.contact_states[c];
+        for c in 0..now.gaps.len() {
+            let gap = state.now.gaps[c];
             // The wall has moved away from what does not follow it.
-            if contact_state.active && gap.penetration <= 0.0 && gap.rate <= 0.0 {
-                *contact_state = ContactState::default();
-                state.record.impacts.change(c, false, t, &mut attempt.events);
+            if state.now.contact_states[c].active && gap.penetration <= 0.0 && gap.rate <= 0.0 {
+                state.end((c, mechanism.contacts.joint_of(c)), t, gap.rate);
+                state.record.impacts.end_step(&mut attempt.events);
             }
         }
-        now.release_bristles(mechanism);
+        state.now.release_bristles(mechanism);
         if state.record.account.on {
             let energies = energies(mechanism, state);
             state.record.account.record_moved_clearances(energies);
         }
         state.record.account.powers = None;
         mechanism.forget_evaluation();
-        let Some((c, depth)) = through else {
+        let Some(c) = thinnest else {
             return Ok(());
         };
-        let joint = self.machine.loose_joints[self.mechanism.contacts.joint_of(c)].name.clone();
+        let j = self.mechanism.contacts.joint_of(c);
+        let walls = self.state.worn_walls(self.machine, j);
+        let depth = walls.iter().map(WornWall::deepest).fold(0.0, f64::max);
+        if depth <= self.mechanism.contacts.coefficients(c).ball_radius {
+            return Ok(());
+        }
+        let joint = self.machine.loose_joints[j].name.clone();
         Err(self.stopped(StopFault::WornThrough { joint, depth }, StopAdvice::LessWear))
     }
 }
