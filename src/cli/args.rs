@@ -144,7 +144,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<PathBuf>,
     /// File for the wear map: one row per cell of the walls of joints with play, with the contacts that began there,
-    /// the impulse and the friction work: .csv, .json or .npz.
+    /// the impulse, the friction work and the worn depth: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub wear: Option<PathBuf>,
     /// File for the state at the end, from which --from-state resumes, with the same bits as a run without a break.

@@ -183,16 +183,15 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
         }
     }
     for Worn { joint, plays, deepest } in worn_joints(simulation) {
-        let plays = plays.iter().map(|&[depth, volume]| {
-            format!("{} um, {} mm^3", significant(1e6 * depth, 6), significant(1e9 * volume, 6))
+        // Of the first play, which alone can wear by direction.
+        let mut most = deepest.map_or_else(String::new, |deepest| {
+            format!(" on average and at most {} um", significant(1e6 * deepest, 6))
         });
-        let mut words = format!("{joint}: {}", plays.collect::<Vec<_>>().join("; "));
-        if let Some(deepest) = deepest {
-            // Of the first play, which alone can wear by direction.
-            let both = format!(" um on average and at most {} um", significant(1e6 * deepest, 6));
-            words = words.replacen(" um", &both, 1);
-        }
-        line("  worn", words);
+        let plays = plays.iter().map(|&[depth, volume]| {
+            let most = std::mem::take(&mut most);
+            format!("{} um{most}, {} mm^3", significant(1e6 * depth, 6), significant(1e9 * volume, 6))
+        });
+        line("  worn", format!("{joint}: {}", plays.collect::<Vec<_>>().join("; ")));
     }
     for part in parts(simulation) {
         line(&part.label, part.description());

@@ -1,8 +1,8 @@
 //! The numbers of `docs/limits.md` are those that the program computes.
 
 use crate::common::{Changes, frame_now, free_ball, parse, run_until, simulation};
+use crate::joint_elements::momenta;
 use jointplay_physics::contact::{ElasticLaw, NormalLaw, Parameters, undisturbed_restitution};
-use jointplay_physics::machine::Vec3;
 use jointplay_physics::simulate::{ContactMode, Frame, Simulation};
 
 /// Asserts that the page contains this sentence, regardless of line breaks.
@@ -100,30 +100,18 @@ socket = { body = "a", at = "100 0 0 mm" }
 ball = { body = "b", at = "-100 0 0 mm" }
 "#;
 
-/// Momentum and angular momentum about the origin of the bodies of [`RODS_IN_SPACE`].
-fn momenta(frame: &Frame) -> [Vec3; 2] {
-    let bodies = [(1.0, [1e-4, 3e-3, 3e-3]), (0.4, [2e-5, 1e-3, 1e-3])];
-    let mut sum = [Vec3::zeros(); 2];
-    for ((mass, inertia), body) in bodies.into_iter().zip(&frame.bodies) {
-        let momentum = mass * body.velocity;
-        let spin = Vec3::from(inertia).component_mul(&body.rotation.tr_mul(&body.angular_velocity));
-        sum[0] += momentum;
-        sum[1] += body.position.cross(&momentum) + body.rotation * spin;
-    }
-    sum
-}
-
 #[test]
 fn friction_changes_the_angular_momentum_of_a_machine_in_space() {
     // Relative changes within two seconds.
     let drift = |changes: &Changes| {
         let changes = [&[("solver.tolerance", "1e-9"), ("contact.approach_speed", "largest")], changes].concat();
-        let mut simulation = Simulation::new(&parse(RODS_IN_SPACE, &changes).machine).unwrap();
-        let [p, l] = momenta(&frame_now(&mut simulation));
+        let machine = parse(RODS_IN_SPACE, &changes).machine;
+        let mut simulation = Simulation::new(&machine).unwrap();
+        let [p, l] = momenta(&frame_now(&mut simulation), &machine);
         let mut largest = [0.0_f64; 2];
         for k in 1..=20 {
             run_until(&mut simulation, 0.1 * f64::from(k));
-            let now = momenta(&frame_now(&mut simulation));
+            let now = momenta(&frame_now(&mut simulation), &machine);
             largest = [largest[0].max((now[0] - p).norm() / p.norm()), largest[1].max((now[1] - l).norm() / l.norm())];
         }
         largest

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use crate::common::{Changes, METHODS, frame_now, pair, pair_joints, parse, replaced, run_until};
-use jointplay_physics::machine::Vec3;
-use jointplay_physics::simulate::{Effect, Frame, Simulation};
+use crate::joint_elements::momenta;
+use jointplay_physics::simulate::{Effect, Simulation};
 use jointplay_scene::{LiveScene, SavedState};
 
 /// A pin of 1 kg, 10 mm in radius and 24 mm long, that turns in its bearing at 100 rad/s, where it rests on the wall from the start: so deep
@@ -406,18 +406,6 @@ fn a_groove_twice_as_deep_as_the_clearance_is_stepped_like_any_wall() {
     }
 }
 
-/// Momentum, kg m/s, and angular momentum, kg m^2/s, of the two bodies of the test below.
-fn momenta(frame: &Frame) -> [Vec3; 2] {
-    let masses = [(0.2, Vec3::new(2e-5, 4e-5, 3e-5)), (0.1, Vec3::new(2e-5, 3e-5, 4e-5))];
-    let mut sum = [Vec3::zeros(); 2];
-    for (motion, (mass, inertia)) in frame.bodies.iter().zip(masses) {
-        let spin = motion.rotation.tr_mul(&motion.angular_velocity);
-        sum[0] += motion.velocity * mass;
-        sum[1] += motion.position.cross(&motion.velocity) * mass + motion.rotation * spin.component_mul(&inertia);
-    }
-    sum
-}
-
 #[test]
 fn worn_walls_keep_momentum_and_the_formulations_agree() {
     let settings = "[contact]\nwear_coefficient = \"1e-7 m^2/N\"\nwear_shape = \"profile\"\nclearance = \"0.1 mm\"\n\
@@ -428,9 +416,10 @@ fn worn_walls_keep_momentum_and_the_formulations_agree() {
             let [tree, lagrange] = ["tree", "lagrange"].map(|formulation| {
                 let changes = [("solver.method", method), ("formulation", formulation)];
                 let mut simulation = start(&text, &changes);
-                let before = momenta(&frame_now(&mut simulation));
+                let machine = simulation.machine().clone();
+                let before = momenta(&frame_now(&mut simulation), &machine);
                 run_until(&mut simulation, 0.004);
-                let after = momenta(&frame_now(&mut simulation));
+                let after = momenta(&frame_now(&mut simulation), &machine);
                 let off = [0, 1].map(|i| (after[i] - before[i]).norm() / before[i].norm());
                 let worn = worn(&simulation);
                 // A ball has the two points of force of the paper, a few micrometres apart.

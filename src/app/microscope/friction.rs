@@ -8,8 +8,7 @@ use crate::app::friction::{Contact, Point};
 use crate::app::overlay::colour;
 use crate::app::player::Player;
 use crate::app::value;
-use crate::contact::FrictionVelocity;
-use crate::contact::{FrictionLaw, Parameters};
+use crate::contact::{FrictionLaw, FrictionVelocity, Parameters};
 
 /// Height where there is room, and least height, points.
 pub const HEIGHT: f32 = 140.0;

@@ -85,7 +85,7 @@ impl ActiveRanges {
         &self.parts[..self.position_ranges]
     }
 
-    /// Ranges of velocities.
+    /// Ranges of velocities, and of what follows them.
     pub fn velocities(&self) -> &[Range<usize>] {
         &self.parts[self.position_ranges..]
     }

@@ -244,7 +244,7 @@ impl State {
         self.record.wear.as_ref()
     }
 
-    /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each loose joint whether each
+    /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, deflections of bristles, then for each loose joint whether each
     /// of its contacts touches and its approach speed (0 and 0 if it is ideal), and its current clearance, with the second, if it has one,
     /// and the worn part of each that has worn, and the depths of a profile that has; then, of the angles that elements act on and
     /// coordinates do not count, the number and the quarter turns of each that has at least two. The current branch of the friction law is
