@@ -1,6 +1,6 @@
 //! Friction that sticks, against closed forms and an independent model.
 
-use crate::common::{Changes, THREE_VARIANTS, frame_now, live, parse, run_until, simulation};
+use crate::common::{Changes, METHODS, THREE_VARIANTS, frame_now, live, parse, run_until, simulation};
 use jointplay_physics::contact::{ElasticLaw, Parameters};
 use jointplay_physics::integrate::Method;
 use jointplay_physics::machine::Vec3;
@@ -343,6 +343,71 @@ fn a_pin_that_sticks_rolls_in_its_bearing() {
 }
 
 /// It swings along its guide on its bristles: two at the corners that press, and their damping.
+/// A bearing that turns at 100 rad/s about a pin of 1 kg which does not: the carrier of the bristles turns under a contact that stays.
+const TURNING: &str = r#"
+[contact]
+friction = 0.1
+friction_law = "bristle"
+[[body]]
+name = "house"
+mass = "1 kg"
+inertia = "0.01 0.01 0.01 kg m^2"
+[[joint]]
+name = "H"
+kind = "revolute"
+child = "house"
+axis = [0, 1, 0]
+drive = { law = "constant", velocity = "100 rad/s" }
+[[body]]
+name = "shaft"
+mass = "1 kg"
+inertia = "1000 1000 1000 kg m^2"
+[[joint]]
+name = "J"
+kind = "cylindrical"
+parent = "house"
+child = "shaft"
+axis = [0, 1, 0]
+start = { angular_velocity = "-100 rad/s", offset = [0, 0, "-0.1001 mm"] }
+play = { radial = "0.1 mm", radius = "10 mm", length = "20 mm" }
+[[bushing]]
+name = "d"
+from = { body = "world" }
+to = { body = "shaft" }
+damping = "3000 3000 3000 N s/m"
+"#;
+
+#[test]
+fn bristles_on_a_turning_wall_stay_in_its_plane_and_take_what_the_drive_gives() {
+    for method in METHODS {
+        // Explicit steps at the limit of their stability fill a wide tolerance with noise.
+        let widest = if method == "dopri5" { "1e-6" } else { "1e-4" };
+        for tolerance in [widest, "1e-7"] {
+            let mut simulation = run(TURNING, &[("solver.method", method), ("solver.tolerance", tolerance)]);
+            run_until(&mut simulation, 0.1);
+            let before = *simulation.ledger().unwrap();
+            run_until(&mut simulation, 2.0);
+            let after = *simulation.ledger().unwrap();
+            let (given, taken) = (after.drive_work - before.drive_work, after.friction_loss - before.friction_loss);
+            let steps = simulation.statistics().steps;
+            println!("{method} {tolerance}: {given} J, {:e} J, {steps} steps", taken - given);
+            assert!(
+                (given / 1.9 / 0.986 - 1.0).abs() < 0.01 && (taken / given - 1.0).abs() < 1e-4,
+                "{method}: {taken}"
+            );
+            // Two ends bear half of the weight each.
+            let limit = 0.1 * 0.5 * 9.81 / 1e8;
+            let state = simulation.state_vector();
+            for bent in state[state.len() - 6..].chunks(3) {
+                let length = Vec3::from_column_slice(bent).norm();
+                assert!(length < 3.0 * limit, "{method} {tolerance}: {length:e} m, not {limit:e}");
+            }
+            // Sliding that does not change limits no implicit step, however short the bristles' time.
+            assert!(method != "radau5" || steps < 1000, "{method} {tolerance}: {steps} steps");
+        }
+    }
+}
+
 #[test]
 fn what_sticks_is_linearised_with_its_stiffness() {
     let mut run = run(&block("-9.81 m/s^2", "", ""), &[]);

@@ -200,6 +200,18 @@ impl Contacts {
         }
     }
 
+    /// Turns deflections into the plane across the normal of the gap last measured: exactly they stay there, but the errors of steps that
+    /// do not resolve them add up along the normal, where nothing takes them back.
+    pub(super) fn flatten_bristles(&self, bristles: &mut [f64], motion: &[Kinematics]) {
+        for contact in &self.contacts {
+            if let Some(state) = contact.bristles {
+                let bent = contact.bent(bristles, &contact.gap.separation.normal, motion);
+                let own = motion[contact.site.carrier.body].rotation.tr_mul(&bent);
+                bristles[state.first..state.first + 3].copy_from_slice(own.as_slice());
+            }
+        }
+    }
+
     /// Energy stored in the bristles, J.
     pub(super) fn bristle_energy(&self, bristles: &[f64]) -> f64 {
         let of = |contact: &Contact| {

@@ -587,6 +587,13 @@ impl Mechanism {
         self.contacts.contact(c).bristle_excess(bristles, self.motion(), contact_state, branch)
     }
 
+    /// Turns the deflections in `y` into the planes in which bristles bend, at the motion last measured.
+    pub(crate) fn flatten_bristles(&self, y: &mut [f64]) {
+        if self.contacts.bristles() > 0 {
+            self.contacts.flatten_bristles(&mut y[self.first_bristle()..], self.motion());
+        }
+    }
+
     /// Straightens the bristles of contacts that have ended in the state `y` with the derivative `k`.
     #[inline]
     pub(crate) fn release_bristles(&self, [y, k]: [&mut [f64]; 2], contact_states: &[ContactState]) {

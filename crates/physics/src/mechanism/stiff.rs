@@ -21,14 +21,15 @@ use crate::machine::{Mat3, Vec3};
 use nalgebra::Complex;
 use std::ops::Range;
 
-/// Bristles of a contact, linearised: G = -(1 - turning) / lag across `along`, and -1 / lag along it; B = turning times the sliding velocity
-/// across it.
+/// Bristles of a contact, linearised: in the plane across `normal` G = -(1 - turning) / lag across `along`, and -1 / lag along it; B = turning
+/// times the sliding velocity across it. Along the normal both are 0.
 #[derive(Clone)]
 struct LinearBristles {
     /// Its part of [`Stiff::slips`].
     slips: Range<usize>,
     /// That of the carrier.
     rotation: Mat3,
+    normal: Vec3,
     along: Vec3,
     turning: f64,
     lag: f64,
@@ -39,27 +40,24 @@ impl LinearBristles {
     const FREE: Self = Self {
         slips: 0..0,
         rotation: Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        normal: Vec3::new(0.0, 0.0, 0.0),
         along: Vec3::new(0.0, 0.0, 0.0),
         turning: 1.0,
         lag: 1.0,
     };
 
-    /// B x_v plus `own`, b_z: the parts across and along the direction of sliding, world axes.
-    fn right(&self, slips: &[(usize, Vec3)], x_v: &[f64], own: &[f64]) -> [Vec3; 2] {
+    /// B x_v plus `own`, b_z: the parts across and along the direction of sliding, and along the normal, world axes.
+    fn right(&self, slips: &[(usize, Vec3)], x_v: &[f64], own: &[f64]) -> [Vec3; 3] {
         let slip: Vec3 = slips[self.slips.clone()].iter().map(|(coordinate, slip)| slip * x_v[*coordinate]).sum();
         let b = self.rotation * Vec3::from_column_slice(own);
-        let parts = |x: Vec3| {
-            let along = self.along * self.along.dot(&x);
-            [x - along, along]
-        };
-        let [across, _] = parts(slip);
-        let [b_across, b_along] = parts(b);
-        [b_across + across * self.turning, b_along]
+        let onto = |axis: &Vec3, x: &Vec3| axis * axis.dot(x);
+        let (along, normal) = (onto(&self.along, &b), onto(&self.normal, &b));
+        [b - along - normal + (slip - onto(&self.along, &slip)) * self.turning, along, normal]
     }
 
-    /// -G across and along.
-    fn decay(&self) -> [f64; 2] {
-        [(1.0 - self.turning) / self.lag, 1.0 / self.lag]
+    /// -G of these parts.
+    fn decay(&self) -> [f64; 3] {
+        [(1.0 - self.turning) / self.lag, 1.0 / self.lag, 0.0]
     }
 }
 
@@ -275,12 +273,13 @@ impl Stiff {
         let bristles = LinearBristles {
             slips: first..self.slips.len(),
             rotation: at.motion[contact.site.carrier.body].rotation,
+            normal: *n,
             along: force.along,
             turning: force.turning,
             lag: law.lag,
         };
         let stiffness = force.by_bending() * (-law.stiffness * force.turning);
-        let [decay, _] = bristles.decay();
+        let [decay, ..] = bristles.decay();
         let slides_fast = force.turning < FAST;
         for l in bristles.slips.clone() {
             let (coordinate, slip) = self.slips[l];
@@ -407,9 +406,8 @@ impl Stiff {
         let (moving, bent) = b.split_at_mut(self.first_bristle);
         let own = self.bristle_scratch[0].chunks_exact(3);
         for ((bristles, own), x) in self.bristles.iter().zip(own).zip(bent.chunks_exact_mut(3)) {
-            let [across, along] = bristles.right(&self.slips, &moving[positions..], own);
-            let [slow, fast] = bristles.decay();
-            let solved = across / (s + slow) + along / (s + fast);
+            let parts = bristles.right(&self.slips, &moving[positions..], own).into_iter().zip(bristles.decay());
+            let solved: Vec3 = parts.map(|(part, decay)| part / (s + decay)).sum();
             x.copy_from_slice(bristles.rotation.tr_mul(&solved).as_slice());
         }
     }

@@ -218,6 +218,7 @@ impl Stepping<'_> {
         write_flights(self.mechanism, &self.state.flights, t_end, &mut end.y);
         clear_flights(self.mechanism, &self.state.flights, &mut end.k);
         self.mechanism.complete_gaps(active_set, &end.y);
+        self.mechanism.flatten_bristles(&mut end.y);
         store_gaps(self.mechanism, &mut end.gaps);
     }
 
