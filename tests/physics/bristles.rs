@@ -344,7 +344,7 @@ fn a_pin_that_sticks_rolls_in_its_bearing() {
 
 /// It swings along its guide on its bristles: two at the corners that press, and their damping.
 /// A bearing that turns at 100 rad/s about a pin of 1 kg which does not: the carrier of the bristles turns under a contact that stays.
-const TURNING: &str = r#"
+pub const TURNING: &str = r#"
 [contact]
 friction = 0.1
 friction_law = "bristle"

@@ -2,8 +2,10 @@
 
 use std::f64::consts::PI;
 
+use crate::bristles::TURNING;
 use crate::common::{Changes, METHODS, frame_now, pair, pair_joints, parse, replaced, run_until};
 use crate::joint_elements::momenta;
+use jointplay_physics::machine::Vec3;
 use jointplay_physics::simulate::{Effect, Simulation};
 use jointplay_scene::{LiveScene, SavedState};
 
@@ -403,6 +405,31 @@ fn a_groove_twice_as_deep_as_the_clearance_is_stepped_like_any_wall() {
         let (steps, share) = (simulation.statistics().steps, simulation.ledger().unwrap().share());
         println!("{method}: {deepest:e} m, {steps} steps, ledger {share:e}");
         assert!(deepest > 1.5e-4 && share < 1e-5 && steps < 10_000, "{method}: {deepest:e} {share:e} {steps}");
+    }
+}
+
+#[test]
+fn a_wall_that_turns_under_a_steady_load_wears_evenly() {
+    for method in ["automatic", "radau5", "dopri5", "discrete-gradient"] {
+        let changes = [
+            ("solver.method", method),
+            ("contact.friction_law", "modified-coulomb"),
+            ("contact.wear_coefficient", "1e-15 m^2/N"),
+            ("contact.wear_shape", "profile"),
+        ];
+        let mut simulation = start(TURNING, &changes);
+        // 31.8 turns.
+        run_until(&mut simulation, 2.0);
+        for wall in simulation.state().worn_walls(simulation.machine(), 0) {
+            let depths: Vec<f64> = (0..360)
+                .map(|degrees| f64::from(degrees).to_radians().sin_cos())
+                .map(|(sine, cosine)| wall.depth(&Vec3::new(cosine, 0.0, sine)))
+                .collect();
+            let mean = depths.iter().sum::<f64>() / 360.0;
+            let [least, most] = [f64::min, f64::max].map(|of| depths.iter().copied().reduce(of).unwrap() / mean);
+            println!("{method}: {least} to {most} of {mean:e} m, {} steps", simulation.statistics().steps);
+            assert!(mean > 1e-14 && least > 0.96 && most < 1.04, "{method}: {least} to {most} of {mean:e} m");
+        }
     }
 }
 

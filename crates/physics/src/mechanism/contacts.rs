@@ -360,6 +360,11 @@ impl Contacts {
         self.contacts[c].profile.as_deref()
     }
 
+    /// As [`Contact::sweep`] of contact `c`.
+    pub(crate) fn sweep(&self, c: ContactId, motion: &[Kinematics]) -> f64 {
+        self.contacts[c].sweep(motion)
+    }
+
     /// As [`Profile::continue_from`] of contact `c`; of one without a profile nothing.
     pub(crate) fn continue_profile(&mut self, c: ContactId, t: f64, depths: &[f64]) {
         if let Some(profile) = &mut self.contacts[c].profile {

@@ -55,6 +55,9 @@ pub use restart::{Linearisation, RestartError};
 pub const CLEARANCE_SPEED: f64 = 2e-3;
 /// Longest step of an adaptive method, s.
 const LONGEST_STEP: f64 = 10e-3;
+/// Largest angle that a place of contact may turn along a wall which wears by direction in a step whose size is not the user's choice,
+/// rad: the wall wears at the quadrature nodes of the step alone.
+const MAX_SWEEP: f64 = 0.2;
 /// Shortest step of an adaptive method, s.
 const SHORTEST_STEP: f64 = 1e-14;
 /// A step that would end within this fraction of its length of a limit ends at the limit.
@@ -190,6 +193,8 @@ struct Control {
     /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
     grid_origin: f64,
     grid_count: u64,
+    /// Fastest turning of a place of contact along a wall that wears by direction, rad/s.
+    sweep: f64,
     discrete: DiscreteControl,
 }
 

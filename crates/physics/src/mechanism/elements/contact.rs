@@ -140,6 +140,15 @@ impl Contact {
         (across - normal * normal.dot(&across)) / distance
     }
 
+    /// How fast the place where it presses turns along its wall, if that wears by direction, rad/s.
+    pub fn sweep(&self, motion: &[Kinematics]) -> f64 {
+        let Some(profile) = self.profile.as_deref().filter(|_| self.gap.separation.penetration > 0.0) else {
+            return 0.0;
+        };
+        let turned = motion[self.site.carrier.body].angular_velocity - motion[profile.worn_body()].angular_velocity;
+        (self.normal_rate(motion) + turned.cross(&self.gap.separation.normal)).norm()
+    }
+
     /// Its wall, if that has worn by direction.
     fn worn_profile(&self) -> Option<&Profile> {
         self.profile.as_deref().filter(|profile| profile.has_worn())

@@ -104,6 +104,7 @@ impl State {
                 controller: controller_of(solver.method, ActiveScheme::Explicit),
                 grid_origin: 0.0,
                 grid_count: 0,
+                sweep: 0.0,
                 discrete: DiscreteControl::new(mechanism),
             },
             polynomial: Polynomial::new(AnyStepper::polynomial_size(solver.method, y.len())),

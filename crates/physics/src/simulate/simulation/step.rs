@@ -4,8 +4,8 @@ use super::discrete::discrete_size;
 use super::flights::{clear_flights, write_flights};
 use super::wear::{Abrasion, Growth};
 use super::{
-    Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, SHORTEST_KINEMATIC_STEP, State, StepEnd, Stepping, Workspace,
-    store_gaps,
+    Attempt, LONGEST_STEP, MAX_SWEEP, Model, NEARLY, OPEN_LOOP, SHORTEST_KINEMATIC_STEP, State, StepEnd, Stepping,
+    Workspace, store_gaps,
 };
 use crate::integrate::{Method, StepControl, System as _};
 use crate::machine::Machine;
@@ -137,19 +137,22 @@ impl Stepping<'_> {
         self.finish_ramps();
         let limit = end.min(self.ramp_end());
         // Fixed steps ignore this limit: their size is the user's choice.
-        let follows_drives = limit.min(self.mechanism.step_end(self.state.now.t));
+        let t = self.state.now.t;
+        let sweep = self.state.control.sweep;
+        let rubs_until = if sweep > 0.0 { t + MAX_SWEEP / sweep } else { f64::INFINITY };
+        let longest = limit.min(self.mechanism.step_end(t)).min(rubs_until);
         self.attempt.element_sides.clear();
         self.attempt.edge = false;
         if self.mechanism.is_kinematic() {
-            self.kinematic_step(follows_drives)?;
+            self.kinematic_step(longest)?;
         } else if self.state.conditions.solver.method.is_adaptive() {
-            let step = self.adaptive_step(follows_drives);
+            let step = self.adaptive_step(longest);
             if step.is_err() {
                 self.discard_step_with_flights();
             }
             step?;
         } else if self.state.conditions.solver.method == Method::DiscreteGradient {
-            self.discrete_step(follows_drives)?;
+            self.discrete_step(longest)?;
         } else {
             self.fixed_step(limit)?;
         }

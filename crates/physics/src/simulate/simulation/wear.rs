@@ -135,6 +135,7 @@ impl Stepping<'_> {
         let Self { mechanism, state, attempt, .. } = self;
         let t = state.now.t;
         let (mut moved, mut thinnest) = (false, None);
+        state.control.sweep = 0.0;
         for (c, rubs) in attempt.abrasion.iter().enumerate() {
             if rubs.iter().all(|rub| rub.depth == 0.0) {
                 continue;
@@ -182,6 +183,7 @@ impl Stepping<'_> {
         store_gaps(mechanism, &mut now.gaps);
         for c in 0..now.gaps.len() {
             let gap = state.now.gaps[c];
+            state.control.sweep = state.control.sweep.max(mechanism.contacts.sweep(c, mechanism.motion()));
             // The wall has moved away from what does not follow it.
             if state.now.contact_states[c].active && gap.penetration <= 0.0 && gap.rate <= 0.0 {
                 state.end((c, mechanism.contacts.joint_of(c)), t, gap.rate);
