@@ -1,7 +1,7 @@
 //! Warnings about settings that are valid but may surprise, in the words of the window, each with the change that removes it.
 
 use crate::analysis::presets::too_slow;
-use crate::machine::{Doubt, Warning};
+use crate::machine::{Brief, Doubt, Warning};
 use crate::scene::Scene;
 use crate::session::value;
 use crate::units::format_quantity_digits;
@@ -55,10 +55,12 @@ impl Advice {
         let text = warning.to_string();
         let remedy = |label: String, key, value: String| Some(Remedy { label, key, value });
         let (brief, words, remedy) = match warning {
-            Warning::Doubt(Doubt::Restitution { joints, law, requested, achieved }) => {
+            Warning::Doubt(Doubt::Restitution { joints, law, requested, achieved, yielding }) => {
                 let [requested, gives] = [*requested, *achieved].map(|value| value::number(value, 2));
+                let at = yielding.map(|speed| format!(" at {}", format_quantity_digits(speed, "mm/s", 3)));
                 let words = format!(
-                    "{joints}: {requested} is asked for, but the contact law {} gives {gives} in an undisturbed impact.",
+                    "{joints}: {requested} is asked for{}, but the contact law {} gives {gives} in an undisturbed impact.",
+                    at.unwrap_or_default(),
                     law.word()
                 );
                 let other = "Use the contact law gonthier".to_owned();
@@ -68,9 +70,13 @@ impl Advice {
             Warning::Doubt(Doubt::Clearance { .. }) => ("very small".to_owned(), text.clone(), None),
             Warning::Doubt(Doubt::ShortPin { .. }) => ("very large".to_owned(), text.clone(), None),
             Warning::Doubt(Doubt::Lubricant { .. }) => ("small for its film".to_owned(), text.clone(), None),
-            Warning::Doubt(Doubt::Step { joint, step, duration, sliding, recommended }) => {
+            Warning::Doubt(Doubt::Step { joint, step, duration, brief, recommended }) => {
                 let time = |seconds: f64| format_quantity_digits(seconds, "us", 3);
-                let what = if *sliding { "friction reverses the sliding" } else { "an impact is over" };
+                let what = match brief {
+                    Brief::Impact => "an impact is over",
+                    Brief::Sliding => "friction reverses the sliding",
+                    Brief::Bristles => "the bristles follow the sliding",
+                };
                 let words = format!(
                     "{joint}: {what} in about {}, which a step of {} does not resolve.",
                     time(*duration),
@@ -131,9 +137,12 @@ mod tests {
     /// The offered change, carried out on a control, leaves no warning about that control.
     #[test]
     fn a_remedy_removes_its_warning() {
-        for (key, value) in
-            [("contact.restitution", "0.3"), ("joint.S2.restitution", "0.3"), ("solver.tolerance", "0.01")]
-        {
+        for (key, value) in [
+            ("contact.restitution", "0.3"),
+            ("joint.S2.restitution", "0.3"),
+            ("contact.yield_speed", "1 mm/s"),
+            ("solver.tolerance", "0.01"),
+        ] {
             let scene = changed(&[(key, value)]);
             let advice = of(&scene);
             let own = advice.iter().find(|advice| advice.concerns(key)).expect("a warning");
@@ -142,11 +151,13 @@ mod tests {
             let mended = changed(&[(key, value), (&remedy.key_for(key), &remedy.value)]);
             assert!(!of(&mended).iter().any(|advice| advice.concerns(key)), "{:?}", of(&mended));
         }
-        let scene = changed(&[("solver.method", "rk4"), ("solver.step", "1 ms")]);
-        let advice = of(&scene);
-        let step = advice.iter().find(|advice| advice.concerns("solver.step")).expect("too long");
-        let remedy = step.remedy.as_ref().expect("a remedy");
-        let mended = changed(&[("solver.method", "rk4"), ("solver.step", &remedy.value)]);
-        assert!(!of(&mended).iter().any(|advice| advice.concerns("solver.step")));
+        let bristles = [("contact.friction_law", "bristle"), ("contact.bristle_damping", "50 N s/m")];
+        for (own, step) in [(&[][..], "1 ms"), (&bristles, "2 us")] {
+            let by = |step: &str| changed(&[&[("solver.method", "rk4"), ("solver.step", step)], own].concat());
+            let advice = of(&by(step));
+            let step = advice.iter().find(|advice| advice.concerns("solver.step")).expect("too long");
+            let remedy = step.remedy.as_ref().expect("a remedy");
+            assert!(!of(&by(&remedy.value)).iter().any(|advice| advice.concerns("solver.step")));
+        }
     }
 }

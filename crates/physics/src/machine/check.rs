@@ -3,8 +3,8 @@
 use std::cmp::Ordering;
 
 use super::{
-    Characteristic, Doubt, Drive, Element, ElementKind, JointCoordinate, JointKind, LooseFault, LooseJoint, Lubricant,
-    Machine, Warning,
+    Brief, Characteristic, Doubt, Drive, Element, ElementKind, JointCoordinate, JointKind, LooseFault, LooseJoint,
+    Lubricant, Machine, Warning,
 };
 use crate::contact::{self, ApproachSpeed, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
@@ -13,6 +13,8 @@ use crate::units::{Dimension, format_quantity, unit_names};
 
 /// Minimum number of fixed steps per impact. With fewer, much of the impact is lost; twice as many resolve it.
 pub const MIN_IMPACT_STEPS: u64 = 5;
+/// Longest step of rk4 that is stable, over the time in which what it steps decays: it must not reach 2.785.
+const STABLE_STEP: f64 = 2.5;
 
 /// Loosest tolerance at which impacts conserve energy to a few per cent.
 const LOOSEST_TOLERANCE: f64 = 1e-3;
@@ -367,10 +369,15 @@ impl Machine {
                 doubts.push(Doubt::MoreJoints);
                 break;
             }
-            let (law, requested) = (contact.normal_law, contact.restitution);
-            let achieved = contact::undisturbed_restitution(law.damping_factor(requested));
-            if contact.clearance > 0.0 && (achieved - requested).abs() > RESTITUTION_ERROR {
-                doubts.push(Doubt::Restitution { joints: joints.clone(), law, requested, achieved });
+            // Where parts yield, also sixteen times as fast, where half of the restitution is asked for.
+            let yielding = (contact.yield_speed > 0.0).then_some(16.0 * contact.yield_speed);
+            for yielding in std::iter::once(None).chain(yielding.map(Some)) {
+                let law = contact.normal_law;
+                let requested = if yielding.is_some() { 0.5 * contact.restitution } else { contact.restitution };
+                let achieved = contact::undisturbed_restitution(law.damping_factor(requested));
+                if contact.clearance > 0.0 && (achieved - requested).abs() > RESTITUTION_ERROR {
+                    doubts.push(Doubt::Restitution { joints: joints.clone(), law, requested, achieved, yielding });
+                }
             }
             if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
                 doubts.push(Doubt::Clearance {
@@ -403,12 +410,17 @@ impl Machine {
         }
         let clearances = self.loose_joints.iter().filter(|j| !j.contact.is_ideal());
         let element_forces = self.element_forces();
-        let (joint, duration) = clearances
-            .map(|joint| (joint, self.impact_duration(joint, &element_forces)))
-            .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
-        let (impact, friction) = duration;
-        let duration = impact / friction;
-        let steps = MIN_IMPACT_STEPS as f64;
+        let of_impacts = clearances.clone().map(|joint| {
+            let (impact, friction) = self.impact_duration(joint, &element_forces);
+            let brief = if friction > 1.0 { Brief::Sliding } else { Brief::Impact };
+            (joint, impact / friction, MIN_IMPACT_STEPS as f64, brief)
+        });
+        let of_bristles = clearances.filter(|joint| joint.contact.has_bristles()).map(|joint| {
+            let lag = joint.contact.bristle_damping / joint.contact.bristle_stiffness;
+            (joint, lag, 1.0 / STABLE_STEP, Brief::Bristles)
+        });
+        let (joint, duration, steps, brief) =
+            of_impacts.chain(of_bristles).min_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
         if self.solver.step <= duration / steps {
             return None;
         }
@@ -417,13 +429,7 @@ impl Machine {
         let decade = libm::pow(10.0, libm::floor(libm::log10(most)));
         let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= most);
         let recommended = digit.unwrap_or(1.0) * decade;
-        Some(Doubt::Step {
-            joint: joint.name.clone(),
-            step: self.solver.step,
-            duration,
-            sliding: friction > 1.0,
-            recommended,
-        })
+        Some(Doubt::Step { joint: joint.name.clone(), step: self.solver.step, duration, brief, recommended })
     }
 
     /// Sum of the magnitudes of the element forces on each body, N, without the stretch of springs, which needs the start poses.

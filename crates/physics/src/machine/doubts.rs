@@ -9,8 +9,9 @@ use crate::units::{format_quantity, format_quantity_digits};
 pub enum Doubt {
     /// The normal-force law does not give the requested restitution.
     #[error(
-        "{joints}: restitution {requested} with {} gives {achieved:.3} in an undisturbed impact; normal_law = gonthier gives \
+        "{joints}: restitution {requested}{} with {} gives {achieved:.3} in an undisturbed impact; normal_law = gonthier gives \
          the restitution asked for{}.",
+        at_speed(*.yielding),
         .law.word(),
         if *.requested > 0.0 { "" } else { ", above 0" }
     )]
@@ -23,6 +24,8 @@ pub enum Doubt {
         requested: f64,
         /// Restitution of an undisturbed impact.
         achieved: f64,
+        /// Approach speed above the yield speed for which this is, m/s; otherwise it is that of slow impacts.
+        yielding: Option<f64>,
     },
     /// A clearance so small that the contact patch is not small compared with the ball.
     #[error(
@@ -80,10 +83,10 @@ pub enum Doubt {
     #[error(
         "solver.step {}: {} {}, which a fixed step this long does not resolve; use {} or less, or solver.method = automatic.",
         format_quantity(*.step, "us"),
-        if *.sliding {
-            format!("friction at joint {joint} is estimated to reverse the sliding in")
-        } else {
-            format!("an impact at joint {joint} is estimated to last")
+        match .brief {
+            Brief::Impact => format!("an impact at joint {joint} is estimated to last"),
+            Brief::Sliding => format!("friction at joint {joint} is estimated to reverse the sliding in"),
+            Brief::Bristles => format!("the bristles of joint {joint} follow its sliding within"),
         },
         format_quantity(libm::round(.duration * 1e8) * 1e-8, "us"),
         format_quantity(*.recommended, "us")
@@ -93,10 +96,10 @@ pub enum Doubt {
         joint: String,
         /// `solver.step`, s.
         step: f64,
-        /// Duration of the impact, or of sliding within it until friction reverses it, s.
+        /// How long that takes which is too brief, s.
         duration: f64,
-        /// Whether `duration` refers to sliding.
-        sliding: bool,
+        /// What is.
+        brief: Brief,
         /// A step that is short enough, s.
         recommended: f64,
     },
@@ -131,6 +134,22 @@ pub enum Doubt {
     /// The list of joints with distinct settings is incomplete.
     #[error("Further joints have settings of their own; warnings about them are not listed.")]
     MoreJoints,
+}
+
+/// What a fixed step may be too long for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Brief {
+    /// An impact.
+    Impact,
+    /// Sliding within an impact, until friction reverses it.
+    Sliding,
+    /// The bend of bristles under a motion that slides: the ratio of their damping to their stiffness.
+    Bristles,
+}
+
+fn at_speed(yielding: Option<f64>) -> String {
+    let words = |speed| format!(" (asked for at {}, above the yield speed)", format_quantity_digits(speed, "mm/s", 3));
+    yielding.map_or_else(String::new, words)
 }
 
 /// A warning before a run: a reason to distrust its result, or a cause of slow stepping. Its `Display` is a sentence.
@@ -195,6 +214,7 @@ impl Warning {
     /// Key of the parameter concerned: `solver.step`, or a key without section that joints with play may override.
     pub fn key(&self) -> Option<&'static str> {
         match self {
+            Self::Doubt(Doubt::Restitution { yielding: Some(_), .. }) => Some("yield_speed"),
             Self::Doubt(Doubt::Restitution { .. }) => Some("restitution"),
             Self::Doubt(Doubt::Clearance { .. } | Doubt::ShortPin { .. } | Doubt::Lubricant { .. }) => {
                 Some("clearance")

@@ -118,7 +118,7 @@ pub enum StopAdvice {
         tolerance: f64,
     },
     /// The fixed step is too long.
-    #[error("try a smaller solver.step (now {step:e} s) or solver.method = automatic, or else a stiffer contact")]
+    #[error("try a smaller solver.step (now {step:e} s) or solver.method = automatic")]
     ShorterStep {
         /// Current value, s.
         step: f64,
