@@ -161,10 +161,10 @@ def value_of(scene: Scene, key: str) -> float:
     return float(value)
 
 
-def seconds_of(scene: Scene, name: str, value: Quantity) -> float:
+def seconds_of(name: str, value: Quantity) -> float:
     """A time above 0, s."""
-    seconds = _native.read_number(scene.native, "solver.step", value) if isinstance(value, str) else float(value)
-    if not 0.0 < seconds < np.inf:
+    seconds = _native.read_duration(name, value)
+    if seconds == 0.0:
         raise OptionError(f"{name} = {value!r}: allowed times above 0 s")
     return seconds
 
@@ -294,7 +294,7 @@ def wear(
     fixed = None if jump is None else amount("jump", jump, 1.0, MAX_CYCLES)
     allowed = amount("tolerance", tolerance, 1e-6, 1.0)
     times = (whole("settle", settle, 0, 1000), whole("observe", observe, 1, 1000), whole("rows", rows, 10, 100_000))
-    model = WearingScene(scene, seconds_of(scene, "period", period), *times)
+    model = WearingScene(scene, seconds_of("period", period), *times)
 
     done, depths = 0.0, np.zeros(int(np.sum(model.counts)))
     now = model.measure(depths)

@@ -41,7 +41,7 @@ mod _native {
     #[pymodule_export]
     use super::simulation::{PySimulation, PyState};
     #[pymodule_export]
-    use super::study::{PyStudy, matching_keys, provenance_of, read_number};
+    use super::study::{PyStudy, matching_keys, provenance_of, read_duration, read_number};
     #[pymodule_export]
     use super::sweep::PySweep;
     #[pymodule_export]

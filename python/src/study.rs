@@ -52,6 +52,12 @@ pub fn read_number(py: Python<'_>, scene: &PyScene, key: &str, text: &str) -> Py
     guarded(py, || read_unchecked(&scene.scene, key, text))?.map_err(|error| invalid(py, &error))
 }
 
+/// A time of the option `name`, s: a number or text with a unit.
+#[pyfunction]
+pub fn read_duration(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    duration(name, value)
+}
+
 /// Provenance of results about `scene`, as every output of the program carries it, in JSON.
 #[pyfunction]
 pub fn provenance_of(scene: &PyScene) -> String {

@@ -376,6 +376,7 @@ fn invalid_films_are_refused_with_their_position() {
         joint = "S" => joint = "T" -> lubricant.oil.joint | no such joint with play; allowed S
         thickness = "1 nm" => thickness = "0 um" -> lubricant.oil.thickness | allowed
         thickness = "1 nm" => length = "10 mm" -> lubricant.oil.length | has the size of that
+        thickness = "1 nm" => [[lubricant]]; name = "fat"; joint = "S"; viscosity = "1 Pa s" -> lubricant.fat.joint | lubricant oil is in this joint; allowed one in each
     "#;
     assert_refused(cases, |change| {
         let (from, to) = change.split_once(" => ").expect(change);
@@ -395,7 +396,7 @@ fn invalid_films_are_refused_with_their_position() {
     let planar = replaced(&journal(), ", length = \"24 mm\"", ", planar = true");
     let error = Scene::parse(&planar, Some("mine.toml"), &[]).unwrap_err().to_string();
     assert!(
-        error.contains("lubricant.oil.length: missing; a pin that stays in its plane has a length only"),
+        error.contains("lubricant.oil.length: missing, e.g. \"20 mm\"; a pin that stays in its plane has a length"),
         "{error}"
     );
 }

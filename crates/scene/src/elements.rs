@@ -653,12 +653,17 @@ fn read_lubricant(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneEr
             allowed_joints(names(), "ball or pin with play")
         )));
     };
+    let mut elements = reader.scene.machine.elements.iter();
+    let is_there = |element: &&Element| matches!(element.kind, ElementKind::Lubricant(other) if other.joint == index);
+    if let Some(other) = elements.find(is_there) {
+        return Err(node.error(format!("lubricant {} is in this joint; allowed one in each", other.name)));
+    }
     let length = reader.section.get("length").map(|_| reader.number("length")).transpose()?;
     match joint.kind {
         LooseKind::Pin(_) if joint.pin_length().or(length).is_none() => {
             return reader.fault(
                 "length",
-                "missing; a pin that stays in its plane has a length only with elastic = \"line\" or stiffness_at",
+                "missing, e.g. \"20 mm\"; a pin that stays in its plane has a length of its own only with elastic = \"line\" or stiffness_at",
             );
         }
         LooseKind::Pin(_) => {}

@@ -550,7 +550,7 @@ pub enum ContactFault {
     #[error("the law {0} divides by the restitution; allowed above 0 to 1; a pure number, no unit")]
     DividesByRestitution(NormalLaw),
     /// A yield speed without a restitution that could fall.
-    #[error("yield_speed needs {needs}; allowed without it 0 m/s")]
+    #[error("yield_speed needs {needs}; without it allowed is yield_speed = 0 m/s")]
     Yield {
         /// What is missing.
         needs: &'static str,
