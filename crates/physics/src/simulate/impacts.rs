@@ -315,6 +315,7 @@ impl Impacts {
     }
 
     /// Reports what the step just recorded brought.
+    #[inline]
     pub(super) fn end_step(&mut self, events: &mut ImpactEvents) {
         for contact in &mut self.contacts {
             let Some(UnderWay { id, impact, peak, rises, ends }) = &mut contact.under_way else {

@@ -86,11 +86,13 @@ impl State {
         self.record.impacts.update(c, &law.elastic, cubic, damping);
         let statistics = &mut self.record.statistics.joints[j];
         statistics.damping = statistics.damping.max(damping);
-        let time = start + theta * (self.now.t - start);
-        let usual = law.damping_at(contact_state.approach_speed);
-        let now = Overdamped { time, ratio: damping, usual };
-        if now.excess() > statistics.overdamped.excess() {
-            statistics.overdamped = now;
+        // Where parts yield, the usual ratio is higher still.
+        if damping > law.damping {
+            let usual = law.damping_at(contact_state.approach_speed);
+            let now = Overdamped { time: start + theta * (self.now.t - start), ratio: damping, usual };
+            if now.excess() > statistics.overdamped.excess() {
+                statistics.overdamped = now;
+            }
         }
     }
 }
