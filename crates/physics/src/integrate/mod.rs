@@ -91,8 +91,8 @@ pub trait System {
 
 /// A system for implicit methods: it provides an approximation of its Jacobian J = df/dy that is good in the stiff part.
 pub trait StiffSystem: System {
-    /// Evaluates J at (t, y) and stores it.
-    fn linearise(&mut self, t: f64, y: &[f64]);
+    /// Evaluates J at (t, y) and stores it; what of it depends on the shift is to fit `shift`, with which it is factored next.
+    fn linearise(&mut self, t: f64, y: &[f64], shift: f64);
     /// Factors `shift` I - J.
     fn factor_shifted(&mut self, shift: f64);
     /// Solves (`shift` I - J) x = b in place.

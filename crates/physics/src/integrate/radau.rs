@@ -166,7 +166,7 @@ impl Radau {
             self.linearise_within(system, t, h, y);
         } else {
             if self.linearised_at != Some(t) {
-                system.linearise(t, y);
+                system.linearise(t, y, REAL / h);
                 self.linearised_at = Some(t);
             }
             self.factor(system, h);
@@ -239,7 +239,7 @@ impl Radau {
     /// on it.
     fn linearise_within<S: StiffSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64]) {
         add(system.active_ranges(), &mut self.stage, y, &self.z[1]);
-        system.linearise(t + C[1] * h, &self.stage);
+        system.linearise(t + C[1] * h, &self.stage, REAL / h);
         self.linearised_at = None;
         self.factor(system, h);
     }
@@ -488,7 +488,7 @@ mod tests {
     }
 
     impl StiffSystem for VanDerPol {
-        fn linearise(&mut self, _t: f64, y: &[f64]) {
+        fn linearise(&mut self, _t: f64, y: &[f64], _shift: f64) {
             self.j =
                 Matrix2::new(0.0, 1.0, (-2.0 * y[0] * y[1] - 1.0) / self.epsilon, (1.0 - y[0] * y[0]) / self.epsilon);
         }

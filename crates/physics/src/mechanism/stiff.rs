@@ -6,8 +6,8 @@
 //! b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s, x_q = (b_q + T x_v) / s, where T maps velocities to
 //! position rates.
 //!
-//! Bristles add deflections z with z' = G z + B v and forces F_z z. Where they stick, G = 0 and z moves with the positions: F_z B is part
-//! of K. Where they slide fast, z follows the velocities: -F_z G^-1 B is part of D. With that, x_z = (s I - G)^-1 (b_z + B x_v).
+//! Bristles add deflections z with z' = G z + B v and forces F_z z, and so F_z (s I - G)^-1 B to M^-1 D + M^-1 K / s. Where they stick,
+//! G = 0 and z moves with the positions; where they slide fast, it follows the velocities. With that, x_z = (s I - G)^-1 (b_z + B x_v).
 
 use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
@@ -60,9 +60,6 @@ impl LinearBristles {
         [(1.0 - self.turning) / self.lag, 1.0 / self.lag, 0.0]
     }
 }
-
-/// Share of the limit by which bristles are turned from which they slide fast.
-const FAST: f64 = 0.5;
 
 /// The linearisation and its factors.
 pub struct Stiff {
@@ -165,7 +162,7 @@ impl Stiff {
         elements: &[Box<dyn ForceElement>],
         active_set: ActiveSet<'_>,
         equations: &dyn Equations,
-        (t, y): (f64, &[f64]),
+        (t, y, shift): (f64, &[f64], f64),
     ) {
         let motion = equations.motion();
         self.y.copy_from_slice(y);
@@ -193,7 +190,7 @@ impl Stiff {
         }
         if !self.bristles.is_empty() {
             for contact in contacts.iter().filter(|contact| contact.bristles.is_some()) {
-                self.gather_bristles(model, contact, equations, &at);
+                self.gather_bristles(model, contact, equations, (&at, shift));
             }
         }
         self.coordinates.clear();
@@ -237,6 +234,15 @@ impl Stiff {
                 self.by_position[at] += k.turn.dot(&torque_q);
                 self.by_velocity[at] += k.turn.dot(&torque_v);
             }
+            let Some(mixed) = &torque_derivatives.mixed else {
+                continue;
+            };
+            for ([force, torque], matrix) in mixed.iter().zip([&mut self.by_position, &mut self.by_velocity]) {
+                let (force, torque) = (force * l.turn, torque * l.centre);
+                for k in &self.columns {
+                    matrix[l.coordinate * n + k.coordinate] += k.centre.dot(&force) + k.turn.dot(&torque);
+                }
+            }
         }
     }
 
@@ -258,7 +264,13 @@ impl Stiff {
     }
 
     /// Adds the force of a contact's bristles, and records how the velocities bend them.
-    fn gather_bristles(&mut self, model: &Model, contact: &Contact, equations: &dyn Equations, at: &At<'_>) {
+    fn gather_bristles(
+        &mut self,
+        model: &Model,
+        contact: &Contact,
+        equations: &dyn Equations,
+        (at, shift): (&At<'_>, f64),
+    ) {
         let (Some(state), Some(law), Some(force), Some(coupling)) =
             (contact.bristles, contact.law.bristles, contact.bristle_force(at), contact.coupling(at))
         else {
@@ -280,17 +292,17 @@ impl Stiff {
         };
         let stiffness = force.by_bending() * (-law.stiffness * force.turning);
         let [decay, ..] = bristles.decay();
-        let slides_fast = force.turning < FAST;
+        // 1 / (s + decay), to first order in 1 / s about that of the shift: a complex one of the same step differs by a seventh at most.
+        let part = shift / (shift + decay);
+        let (by_position, by_velocity) = (part * part, part * (1.0 - part) / shift);
         for l in bristles.slips.clone() {
             let (coordinate, slip) = self.slips[l];
             let force = stiffness * slip;
             for k in &self.columns {
                 let at = coordinate * self.n + k.coordinate;
-                if slides_fast {
-                    self.by_velocity[at] += k.surface.dot(&force) / decay;
-                } else {
-                    self.by_position[at] += k.surface.dot(&force);
-                }
+                let force = k.surface.dot(&force);
+                self.by_position[at] += by_position * force;
+                self.by_velocity[at] += by_velocity * force;
             }
         }
         self.bristles[state.first / 3] = bristles;

@@ -114,7 +114,7 @@ impl System for Evaluator<'_> {
 }
 
 impl StiffSystem for Evaluator<'_> {
-    fn linearise(&mut self, t: f64, y: &[f64]) {
+    fn linearise(&mut self, t: f64, y: &[f64], shift: f64) {
         self.mechanism.prepare_linearisation();
         let Some(mut stiff) = self.mechanism.stiff.take() else {
             return;
@@ -124,7 +124,7 @@ impl StiffSystem for Evaluator<'_> {
         stiff.derivative = scratch;
         let Mechanism { model, equations, contacts, elements, .. } = &mut *self.mechanism;
         let active_set = self.active_set;
-        stiff.gather(model, contacts, elements, active_set, &**equations, (t, y));
+        stiff.gather(model, contacts, elements, active_set, &**equations, (t, y, shift));
         stiff.apply_inverse_mass(model, &mut **equations);
         self.mechanism.stiff = Some(stiff);
     }

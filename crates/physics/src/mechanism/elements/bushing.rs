@@ -123,6 +123,7 @@ impl ForceElement for Bushing {
                 to_torque * Mat3::from_diagonal(&self.bushing.turning_stiffness) * to_torque.transpose(),
             ),
             by_angular_velocity: across(&self.bushing.turning_damping),
+            mixed: None,
         };
         let along = [across(&self.bushing.stiffness), across(&self.bushing.damping)];
         let ends = self.ends_in(&s, at.motion);

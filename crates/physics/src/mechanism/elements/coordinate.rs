@@ -189,7 +189,8 @@ impl Coordinate {
         let (stiffness, damping) = (along * slopes.by_position, along * slopes.by_rate);
         let ends = self.ends(motion);
         if self.turns {
-            let torque_derivatives = TorqueDerivatives { by_rotation: stiffness, by_angular_velocity: damping };
+            let torque_derivatives =
+                TorqueDerivatives { by_rotation: stiffness, by_angular_velocity: damping, mixed: None };
             return Coupling::at_one_point(ends, [Mat3::zeros(); 2], torque_derivatives);
         }
         Coupling::at_one_point(ends, [stiffness, damping], TorqueDerivatives::default())

@@ -216,16 +216,24 @@ impl ForceElement for Film {
         let ends = self.ends(at.motion)?;
         let middle = self.middle(at.motion);
         let (mut along, mut torque) = ([Mat3::zeros(); 2], TorqueDerivatives::default());
+        let mut mixed = [[Mat3::zeros(); 2]; 2];
         for station in &self.stations {
             let s = self.state(station, at.motion);
             torque.by_angular_velocity -= self.drag(&s, at.motion);
             let [by_displacement, by_velocity] = self.law.derivatives(&s.eccentricity, &s.velocity, &s.confined);
+            // The velocity is that of a point which turns with the mean of both bodies: a displacement changes it, too.
+            let turning = station.iter().map(|end| at.motion[end.body].angular_velocity).sum::<Vec3>() * 0.5;
+            let by_displacement = by_displacement - by_velocity * turning.cross_matrix() * s.confined;
             let arm = (s.point - middle).cross_matrix();
-            along[0] += by_displacement;
-            along[1] += by_velocity;
+            for (order, derivative) in [by_displacement, by_velocity].into_iter().enumerate() {
+                along[order] += derivative;
+                mixed[order][0] -= derivative * arm;
+                mixed[order][1] += arm * derivative;
+            }
             torque.by_rotation -= arm * by_displacement * arm;
             torque.by_angular_velocity -= arm * by_velocity * arm;
         }
+        torque.mixed = (self.stations.len() > 1).then_some(mixed);
         Some(Coupling::at_one_point(ends, along, torque))
     }
 

@@ -186,6 +186,9 @@ pub(super) struct TorqueDerivatives {
     /// Derivatives with respect to relative rotation, N m/rad, and to relative angular velocity, N m s/rad.
     pub(crate) by_rotation: Mat3,
     pub(crate) by_angular_velocity: Mat3,
+    /// By positions and by velocities, if it has such: derivatives of the force with respect to the relative rotation, N/rad or N s/rad,
+    /// and of the torque with respect to the displacement, N or N s.
+    pub(crate) mixed: Option<[[Mat3; 2]; 2]>,
 }
 
 impl Coupling {
