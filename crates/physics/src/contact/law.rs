@@ -178,7 +178,7 @@ pub struct Coefficients {
     /// Whether the damping term divides by the contact's largest rate so far instead of its rate at the start.
     pub(crate) uses_largest_rate: bool,
     /// Whether the damping term divides by the speed with which the contact began: neither by its largest rate nor by one that yielding lowers.
-    pub(super) keeps_speed: bool,
+    pub(crate) keeps_speed: bool,
 }
 
 impl Coefficients {
