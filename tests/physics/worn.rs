@@ -434,6 +434,25 @@ fn a_wall_that_turns_under_a_steady_load_wears_evenly() {
 }
 
 #[test]
+fn what_wears_no_more_limits_no_step() {
+    for method in ["automatic", "radau5"] {
+        let changes = [
+            ("solver.method", method),
+            ("contact.friction_law", "modified-coulomb"),
+            ("contact.wear_coefficient", "1e-15 m^2/N"),
+            ("contact.wear_shape", "profile"),
+        ];
+        let mut simulation = start(TURNING, &changes);
+        run_until(&mut simulation, 1.0);
+        let worn = simulation.statistics().steps;
+        assert_eq!(simulation.set("contact.wear_coefficient", "0 m^2/N"), Ok(Effect::Now));
+        run_until(&mut simulation, 2.0);
+        let more = simulation.statistics().steps - worn;
+        assert!(worn > 500 && more < 250, "{method}: {worn}, then {more}");
+    }
+}
+
+#[test]
 fn worn_walls_keep_momentum_and_the_formulations_agree() {
     let settings = "[contact]\nwear_coefficient = \"1e-7 m^2/N\"\nwear_shape = \"profile\"\nclearance = \"0.1 mm\"\n\
         [solver]\ntolerance = 1e-10\nstep = \"1 us\"\n";

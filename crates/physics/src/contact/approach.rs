@@ -37,10 +37,9 @@ impl Coefficients {
     #[inline]
     pub(super) fn approach(&self, branch: ApproachBranch, stored: f64, rate: f64) -> f64 {
         match branch {
-            ApproachBranch::Rising => self.with_floor(rate),
-            _ if self.keeps_speed => stored,
             ApproachBranch::Unfrozen if self.uses_largest_rate => stored.max(rate),
             ApproachBranch::Unfrozen | ApproachBranch::Held => self.yielded(stored),
+            ApproachBranch::Rising => self.with_floor(rate),
         }
     }
 

@@ -177,8 +177,6 @@ pub struct Coefficients {
     pub(crate) clearance_rate: f64,
     /// Whether the damping term divides by the contact's largest rate so far instead of its rate at the start.
     pub(crate) uses_largest_rate: bool,
-    /// Whether the damping term divides by the speed with which the contact began: neither by its largest rate nor by one that yielding lowers.
-    pub(crate) keeps_speed: bool,
 }
 
 impl Coefficients {
@@ -202,7 +200,6 @@ impl Coefficients {
             clearance,
             clearance_rate: 0.0,
             uses_largest_rate: parameters.approach_speed == ApproachSpeed::Largest,
-            keeps_speed: parameters.approach_speed == ApproachSpeed::Start && parameters.yield_speed <= 0.0,
         }
     }
 

@@ -128,6 +128,7 @@ impl Stepping<'_> {
     /// # Errors
     /// A wall has worn through.
     pub(super) fn wear_walls(&mut self) -> Result<(), Stopped> {
+        self.state.control.sweep = 0.0;
         if !self.mechanism.contacts.wears() {
             return Ok(());
         }
@@ -135,7 +136,6 @@ impl Stepping<'_> {
         let Self { mechanism, state, attempt, .. } = self;
         let t = state.now.t;
         let (mut moved, mut thinnest) = (false, None);
-        state.control.sweep = 0.0;
         for (c, rubs) in attempt.abrasion.iter().enumerate() {
             if rubs.iter().all(|rub| rub.depth == 0.0) {
                 continue;
