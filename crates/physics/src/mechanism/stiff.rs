@@ -292,7 +292,7 @@ impl Stiff {
         };
         let stiffness = force.by_bending() * (-law.stiffness * force.turning);
         let [decay, ..] = bristles.decay();
-        // 1 / (s + decay), to first order in 1 / s about that of the shift: a complex one of the same step differs by a seventh at most.
+        // 1 / (s + decay), to first order in 1 / s about that of the shift: at the complex one of the same step it is off by less than a fifth.
         let part = shift / (shift + decay);
         let (by_position, by_velocity) = (part * part, part * (1.0 - part) / shift);
         for l in bristles.slips.clone() {
